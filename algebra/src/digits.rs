@@ -1,5 +1,5 @@
-//! Floating-point numbers of some 130 digits: what two functions have in common shows beside what rounding leaves of them,
-//! however small either is in machine numbers.
+//! Floating-point numbers of some 130 digits. Values that double precision cannot distinguish from rounding errors
+//! remain distinguishable here.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::sync::OnceLock;
@@ -9,20 +9,22 @@ use num_traits::{Signed, ToPrimitive, Zero};
 
 use crate::Rational;
 
-/// Bits that a number keeps.
+/// Bits of a mantissa.
 const BITS: u64 = 448;
-/// Bits more for what is summed up inside a function.
+/// Additional bits for intermediate results of functions.
 const GUARD_BITS: u64 = 64;
 
-/// `mantissa * 2^exponent`, of `BITS` bits at most; zero has the exponent zero.
+/// `mantissa * 2^exponent`, with at most [`BITS`] bits in the mantissa; zero has the exponent zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BigFloat {
+    /// Signed mantissa.
     mantissa: BigInt,
+    /// Exponent of two.
     exponent: i64,
 }
 
 impl BigFloat {
-    /// A relative error far above that of a chain of many operations.
+    /// A relative error far above the rounding errors of long computations.
     pub const ROUNDING: f64 = 1e-120;
 
     /// 0
@@ -43,6 +45,7 @@ impl BigFloat {
         Self::round_to_bits(mantissa, exponent, BITS)
     }
 
+    /// Rounds to a number of bits, towards zero.
     fn round_to_bits(mantissa: BigInt, exponent: i64, bits: u64) -> Self {
         if mantissa.is_zero() {
             return Self::zero();
@@ -60,13 +63,15 @@ impl BigFloat {
         }
     }
 
-    /// The value of a machine number; `None` where that is no number.
+    /// The exact value of a double; `None` if it is not finite.
     pub fn from_f64(value: f64) -> Option<Self> {
         if !value.is_finite() {
             return None;
         }
         let bits = value.to_bits();
         let biased = i64::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
+        // Bits of an IEEE double: sign, 11 bits of exponent, 52 bits of fraction. Subnormal numbers have no leading
+        // one.
         let fraction = bits & ((1 << 52) - 1);
         let (magnitude, exponent) = if biased == 0 {
             (fraction, -1074)
@@ -78,8 +83,9 @@ impl BigFloat {
         Some(Self::new(signed, exponent))
     }
 
-    /// The shortest decimal number that is read as `value`: what a person wrote; `None` where that is no number.
+    /// The shortest decimal number that is read as `value`, which is what a person wrote; `None` if it is not finite.
     pub fn from_shortest_decimal(value: f64) -> Option<Self> {
+        // The standard library prints the shortest decimal that is read as the same double.
         let text = value.is_finite().then(|| format!("{value:e}"))?;
         let (mantissa, exponent) = text.split_once('e')?;
         let n_places = mantissa
@@ -95,7 +101,7 @@ impl BigFloat {
         })
     }
 
-    /// A fraction.
+    /// The quotient of numerator and denominator, rounded.
     pub fn from_rational(value: &Rational) -> Self {
         if let Some((n, d)) = value.as_small() {
             return if d == 1 {
@@ -108,10 +114,11 @@ impl BigFloat {
         Self::new(big.numer().clone(), 0) / Self::new(big.denom().clone(), 0)
     }
 
-    /// The nearest machine number, but for its last bit.
+    /// The nearest double, up to its last bit.
     pub fn to_f64(&self) -> f64 {
         let short = Self::round_to_bits(self.mantissa.clone(), self.exponent, 60);
         let mantissa = short.mantissa.to_f64().unwrap_or(0.0);
+        // Numbers outside of the range of doubles become zero or infinite.
         // In two steps, so that neither power leaves the range before the product does.
         let half = short.exponent.clamp(-2200, 2200) / 2;
         let rest = short.exponent.clamp(-2200, 2200) - half;
@@ -156,6 +163,7 @@ impl BigFloat {
             let below = self.power(-n).filter(|x| !x.is_zero())?;
             return Some(Self::integer(1) / below);
         }
+        // Repeated squaring over the binary digits of n.
         let (mut rest, mut square, mut product) = (n, self.clone(), Self::integer(1));
         while rest > 0 {
             if rest & 1 == 1 {
@@ -169,7 +177,7 @@ impl BigFloat {
         Some(product)
     }
 
-    /// The square root; `None` of what is negative.
+    /// The square root; `None` for negative numbers.
     #[must_use]
     pub fn sqrt(&self) -> Option<Self> {
         if self.is_negative() {
@@ -178,6 +186,7 @@ impl BigFloat {
         if self.is_zero() {
             return Some(Self::zero());
         }
+        // The mantissa is extended so that its integer root has enough bits; the exponent must be even.
         let wanted = 2 * BITS;
         let mut shift = wanted.saturating_sub(self.mantissa.bits());
         if (self.exponent - i64::try_from(shift).expect("some bits")) % 2 != 0 {
@@ -187,7 +196,7 @@ impl BigFloat {
         Some(Self::new((&self.mantissa << shift).sqrt(), exponent / 2))
     }
 
-    /// The power of two below which its magnitude lies.
+    /// The exponent of the power of two directly above its magnitude.
     fn binary_magnitude(&self) -> i64 {
         i64::try_from(self.mantissa.bits()).expect("some bits") + self.exponent
     }
@@ -203,17 +212,19 @@ impl BigFloat {
         }
     }
 
-    /// How often an argument is halved for its series, and the places that doubling costs besides.
+    /// How often an argument is halved before its series is used, and the number of binary places that the later
+    /// doublings need. `None` for arguments that are too large.
     fn argument_halvings(&self) -> Option<(u64, u64)> {
-        /// Arguments beyond 2^40 have no place in a mechanism.
+        /// Larger arguments than 2^40 do not occur in mechanisms.
         const LARGEST: i64 = 40;
+        /// Arguments are halved until they are below 2^-20.
         const SMALL: i64 = 20;
         let n = (self.binary_magnitude() + SMALL).max(0);
         let n = (self.binary_magnitude() <= LARGEST).then(|| n.unsigned_abs())?;
         Some((n, BITS + GUARD_BITS + 2 * n))
     }
 
-    /// Cosine and sine of an angle in rad; `None` of one that is beyond all measure.
+    /// Cosine and sine of an angle in rad; `None` for angles above 2^40.
     pub fn cos_sin(&self) -> Option<(Self, Self)> {
         let (n, places) = self.argument_halvings()?;
         let one = BigInt::from(1) << places;
@@ -221,7 +232,7 @@ impl BigFloat {
             .scale_by_power_of_two(-i64::try_from(n).ok()?)
             .to_fixed_point(places);
         let square: BigInt = (&x * &x) >> places;
-        // 1 - cos by its series, since doubling it loses nothing.
+        // 1 - cos by its series: doubling the angle loses no digits of it.
         let (mut term, mut versed) = (square.clone() >> 1_u32, BigInt::zero());
         let mut k = 2_u64;
         while !term.is_zero() {
@@ -229,6 +240,7 @@ impl BigFloat {
             term = -((term * &square) >> places) / ((k + 1) * (k + 2));
             k += 2;
         }
+        // The sine by its series.
         let (mut term, mut sine) = (x, BigInt::zero());
         let mut k = 1_u64;
         while !term.is_zero() {
@@ -236,6 +248,7 @@ impl BigFloat {
             term = -((term * &square) >> places) / ((k + 1) * (k + 2));
             k += 2;
         }
+        // Doubling: 1 - cos 2x = 2 sin^2 x, sin 2x = 2 sin x cos x.
         for _ in 0..n {
             let cosine = &one - &versed;
             versed = (&sine * &sine) >> (places - 1);
@@ -245,9 +258,9 @@ impl BigFloat {
         Some((Self::new(one - versed, exponent), Self::new(sine, exponent)))
     }
 
-    /// The exponential; `None` where it is beyond all measure.
+    /// The exponential; `None` for arguments above 1e4 in magnitude.
     pub fn exp(&self) -> Option<Self> {
-        /// The exponential of this is still of use.
+        /// Exponentials of larger arguments are of no use.
         const LARGEST: f64 = 1e4;
         if self.to_f64().abs() > LARGEST {
             return None;
@@ -256,16 +269,19 @@ impl BigFloat {
         let x = self
             .scale_by_power_of_two(-i64::try_from(n).ok()?)
             .to_fixed_point(places);
+        // The series at the argument divided by a power of two.
         let mut total = BigInt::zero();
         let (mut term, mut k) = (BigInt::from(1) << places, 1_u64);
         while !term.is_zero() {
             total += &term;
             term = ((term * &x) >> places) / k;
+            // Shifts of negative numbers round down, so the last term would never become zero.
             if term == BigInt::from(-1) {
                 break;
             }
             k += 1;
         }
+        // exp(2x) = exp(x)^2
         let mut value = Self::round_to_bits(total, -i64::try_from(places).ok()?, places);
         for _ in 0..n {
             let mantissa = &value.mantissa * &value.mantissa;
@@ -274,8 +290,9 @@ impl BigFloat {
         Some(Self::new(value.mantissa, value.exponent))
     }
 
-    /// The hyperbolic tangent.
+    /// The hyperbolic tangent; 1 or -1 for arguments above 400 in magnitude.
     pub fn tanh(&self) -> Option<Self> {
+        // Above this argument the difference to 1 is below the last bit.
         const FLAT: f64 = 400.0;
         let size = self.to_f64();
         if size.abs() > FLAT {
@@ -287,9 +304,11 @@ impl BigFloat {
 
     /// pi, by Machin's formula (1706).
     pub fn pi() -> Self {
+        // Computed once and shared by all threads.
         static PI: OnceLock<BigFloat> = OnceLock::new();
         PI.get_or_init(|| {
             let places = BITS + GUARD_BITS;
+            // arctan(1/n) by its series, in fixed point.
             let arctangent = |inverse: u64| {
                 let mut power = (BigInt::from(1) << places) / inverse;
                 let (mut total, mut k) = (BigInt::zero(), 1_u64);
@@ -322,12 +341,13 @@ impl Add for &BigFloat {
         } else {
             (other, self)
         };
-        // What lies below the last bit of the larger one is left out.
+        // Digits below the last bit of the larger number have no effect.
         if high.binary_magnitude() - low.binary_magnitude()
             > i64::try_from(BITS + GUARD_BITS).expect("some bits")
         {
             return high.clone();
         }
+        // Both mantissas in units of the smaller exponent.
         let shift = (high.exponent - low.exponent).unsigned_abs();
         BigFloat::new((&high.mantissa << shift) + &low.mantissa, low.exponent)
     }
@@ -365,6 +385,7 @@ impl Div for BigFloat {
     /// The divisor must not be zero.
     fn div(self, other: BigFloat) -> BigFloat {
         assert!(!other.is_zero(), "a divisor is not zero");
+        // The dividend is extended so that the quotient has enough bits.
         let shift = (BITS + other.mantissa.bits() + 1).saturating_sub(self.mantissa.bits());
         let exponent = self.exponent - other.exponent - i64::try_from(shift).expect("some bits");
         BigFloat::new((self.mantissa << shift) / other.mantissa, exponent)

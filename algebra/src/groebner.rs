@@ -1,4 +1,5 @@
-//! Groebner bases: equations go in; equations with the same solutions come out from which the solutions can be read.
+//! Groebner bases: equations go in. Equations with the same solutions come out, from which the solutions can be
+//! computed.
 //!
 //! Buchberger's algorithm with the normal strategy and his two criteria, in exact arithmetic
 //! (D. Cox, J. Little, D. O'Shea, "Ideals, Varieties, and Algorithms", 2.6 to 2.10).
@@ -7,18 +8,19 @@ use num_traits::One;
 
 use crate::polynomial::{Polynomial, TermExponents};
 
-/// More than this much work is given up: `terms * bits of coefficients`, summed over all steps of division.
+/// Limit of the work: `terms * bits of coefficients`, summed over all division steps.
 const MOST_WORK: u64 = 4_000_000_000;
 
-/// The equations are too many or of too high degree to be solved exactly.
+/// Error: the equations are too many, or of too high degree, to be solved exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GroebnerLimitExceeded;
 
-/// How much work was done.
+/// Work that has been done, in the units of the limit.
 #[derive(Debug, Default)]
 pub struct GroebnerWork(u64);
 
 impl GroebnerWork {
+    /// Counts one division step by `polynomial`; an error if the limit is exceeded.
     fn add_division_cost(&mut self, polynomial: &Polynomial) -> Result<(), GroebnerLimitExceeded> {
         let bits = polynomial
             .leading_term()
@@ -32,7 +34,10 @@ impl GroebnerWork {
     }
 }
 
-/// The remainder of division by a list of monic polynomials, of which no term can be divided any more.
+/// The remainder of a division by a list of monic polynomials: none of its terms is divisible by a leading term.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if the work exceeds the limit.
 pub fn remainder(
     polynomial: &Polynomial,
     by: &[Polynomial],
@@ -42,6 +47,7 @@ pub fn remainder(
     let mut remainder = Polynomial::new(polynomial.n);
     while let Some((term, factor)) = rest.terms.last_key_value() {
         let (term, factor) = (term.clone(), factor.clone());
+        // The first member whose leading term divides the present one is subtracted.
         let divisor = by.iter().find_map(|g| {
             let shift = term.quotient(g.leading_term()?.0)?;
             Some((g, shift))
@@ -51,6 +57,7 @@ pub fn remainder(
                 work.add_division_cost(g)?;
                 rest.add_shifted(g, &shift, &-factor);
             }
+            // A term that no member divides belongs to the remainder.
             None => {
                 rest.terms.remove(&term);
                 remainder.terms.insert(term, factor);
@@ -60,11 +67,16 @@ pub fn remainder(
     Ok(remainder)
 }
 
-/// The reduced Groebner basis, by ascending leading terms; `[1]` where there are no solutions.
+/// The reduced Groebner basis, in ascending order of leading terms; `[1]` if there are no solutions.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if the work exceeds the limit.
 pub fn groebner_basis(
     equations: &[Polynomial],
     work: &mut GroebnerWork,
 ) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+    // Members so far, and pairs whose S-polynomials have not been reduced, each with the common multiple of its leading
+    // terms.
     let mut basis: Vec<Polynomial> = Vec::new();
     let mut pairs: Vec<(TermExponents, usize, usize)> = Vec::new();
     // Low degrees first: linear equations then act as a plain elimination.
@@ -79,6 +91,7 @@ pub fn groebner_basis(
         if is_redundant_pair(&lcm, i, j, &basis, &pairs) {
             continue;
         }
+        // The S-polynomial: the leading terms of both multiples cancel.
         let mut s = Polynomial::new(basis[i].n);
         for (k, sign) in [(i, 1), (j, -1)] {
             let leading = basis[k].leading_term().expect("members are not zero").0;
@@ -92,7 +105,7 @@ pub fn groebner_basis(
     reduce_basis(basis, work)
 }
 
-/// Adds a member, and the pairs that it makes with the others.
+/// Adds a member, and its pairs with the others; zero is not added.
 fn insert_basis_member(
     mut new: Polynomial,
     basis: &mut Vec<Polynomial>,
@@ -105,7 +118,7 @@ fn insert_basis_member(
     for (i, other) in basis.iter().enumerate() {
         let theirs = other.leading_term().expect("members are not zero").0;
         let lcm = leading.least_common_multiple(theirs);
-        // Coprime leading terms have nothing to say to each other.
+        // Buchberger's first criterion: the S-polynomial of coprime leading terms reduces to zero.
         if lcm.degree() < leading.degree() + theirs.degree() {
             pairs.push((lcm, i, basis.len()));
         }
@@ -113,11 +126,13 @@ fn insert_basis_member(
     basis.push(new);
 }
 
+/// Index of the pair with the least common multiple (normal strategy).
 fn least_pair(pairs: &[(TermExponents, usize, usize)]) -> Option<usize> {
     (0..pairs.len()).min_by(|a, b| pairs[*a].cmp(&pairs[*b]))
 }
 
-/// Buchberger's second criterion: a third member stands between the two, and its pairs with them are done.
+/// Buchberger's second criterion: the leading term of a third member divides the common multiple, and its pairs with
+/// both members have been reduced.
 fn is_redundant_pair(
     lcm: &TermExponents,
     i: usize,
@@ -140,7 +155,7 @@ fn is_redundant_pair(
     })
 }
 
-/// Drops members whose leading terms others divide, and divides each by the rest.
+/// Removes members whose leading terms are divisible by others', and reduces the remaining ones by each other.
 fn reduce_basis(
     mut basis: Vec<Polynomial>,
     work: &mut GroebnerWork,
@@ -162,6 +177,7 @@ fn reduce_basis(
             kept.push(member);
         }
     }
+    // Only the tail is reduced: no other member divides the leading term.
     for k in 0..kept.len() {
         let mut tail = kept[k].clone();
         let (leading, factor) = tail.terms.pop_last().expect("members are not zero");
@@ -172,15 +188,18 @@ fn reduce_basis(
     Ok(kept)
 }
 
-/// Whether a basis says that there are no solutions, not even complex ones.
+/// Whether a basis shows that there are no solutions, not even complex ones.
 pub fn has_no_solution(basis: &[Polynomial]) -> bool {
     basis.first().is_some_and(|p| {
         p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one())
     })
 }
 
-/// The terms that no leading term divides, by ascending order; `None` where they never end, because solutions form
-/// curves or surfaces. At most `most` of them, else [`TooHard`].
+/// The terms that no leading term divides, in ascending order; `None` if they are infinitely many, because solutions
+/// form curves or surfaces.
+///
+/// # Errors
+/// [`GroebnerLimitExceeded`] if there are more than `most`.
 pub fn standard_terms(
     basis: &[Polynomial],
     n: usize,
@@ -190,10 +209,12 @@ pub fn standard_terms(
         .iter()
         .filter_map(|g| Some(g.leading_term()?.0))
         .collect();
+    // They are finitely many if a power of every unknown is a leading term.
     let is_bounded = |i: usize| leading.iter().any(|term| term.degree() == term.0[i]);
     if !(0..n).all(is_bounded) {
         return Ok(None);
     }
+    // Search from the term 1 by multiplication with unknowns.
     let mut terms = std::collections::BTreeSet::new();
     let mut open = vec![TermExponents::unit_term(n)];
     while let Some(term) = open.pop() {

@@ -1,4 +1,4 @@
-//! Polynomials in several unknowns with rational coefficients, and how their terms are ordered.
+//! Polynomials in several unknowns with rational coefficients, and the order of their terms.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
-/// Exponents of a term, one for each unknown, in graded reverse lexicographic order.
+/// Exponents of a term, one per unknown, in graded reverse lexicographic order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TermExponents(pub Vec<u32>);
 
@@ -63,6 +63,7 @@ impl PartialOrd for TermExponents {
 }
 
 impl Ord for TermExponents {
+    // The degree decides first; among equal degrees the term with the smaller exponent of the last unknown is greater.
     fn cmp(&self, other: &Self) -> Ordering {
         let by_degree = self.degree().cmp(&other.degree());
         by_degree.then_with(|| {
@@ -75,7 +76,7 @@ impl Ord for TermExponents {
     }
 }
 
-/// A polynomial in `n` unknowns with exact coefficients, none of them zero.
+/// A polynomial in `n` unknowns with exact coefficients, none of them zero: a sum of terms in their order.
 ///
 /// ```
 /// use modelmill_algebra::polynomial::{Polynomial, exact};
@@ -86,7 +87,7 @@ impl Ord for TermExponents {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polynomial {
-    /// Terms with their coefficients, the greatest last.
+    /// Terms with their coefficients, in ascending order.
     pub terms: BTreeMap<TermExponents, BigRational>,
     /// Number of unknowns.
     pub n: usize,
@@ -130,7 +131,7 @@ impl Polynomial {
         }
     }
 
-    /// The greatest term with its coefficient.
+    /// The greatest term with its coefficient; `None` for the polynomial zero.
     pub fn leading_term(&self) -> Option<(&TermExponents, &BigRational)> {
         self.terms.last_key_value()
     }
@@ -140,7 +141,7 @@ impl Polynomial {
         self.leading_term().map_or(0, |(term, _)| term.degree())
     }
 
-    /// Divides by the leading coefficient.
+    /// Divides by the leading coefficient; zero stays zero.
     pub fn make_monic(&mut self) {
         let Some((_, leading)) = self.leading_term() else {
             return;
@@ -166,12 +167,12 @@ impl Polynomial {
         derivative
     }
 
-    /// Whether an unknown stands in it.
+    /// Whether an unknown occurs in it.
     pub fn has_unknown(&self, i: usize) -> bool {
         self.terms.keys().any(|term| term.0[i] > 0)
     }
 
-    /// Its value in floating point.
+    /// Its value in double precision, for values of all unknowns.
     pub fn value(&self, at: &[f64]) -> f64 {
         let terms = self.terms.iter();
         terms
@@ -184,7 +185,7 @@ impl Polynomial {
             .sum()
     }
 
-    /// Its exact value.
+    /// Its exact value, for exact values of all unknowns.
     pub fn exact_value(&self, at: &[BigRational]) -> BigRational {
         let mut sum = BigRational::zero();
         for (term, factor) in &self.terms {
@@ -200,11 +201,11 @@ impl Polynomial {
     }
 }
 
-/// The decimal number that a value is printed as: 1.13 means 113/100, not its neighbour in binary.
+/// The decimal number that a value is printed as: 1.13 means 113/100 and not the nearest binary fraction.
 ///
 /// The value must be finite.
 pub fn exact_decimal(value: f64) -> BigRational {
-    assert!(value.is_finite(), "{value} is no number");
+    assert!(value.is_finite(), "{value} is not finite");
     let text = format!("{value:e}");
     let (digits, exponent) = text.split_once('e').expect("an exponent is printed");
     let exponent: i32 = exponent.parse().expect("a small exponent");
@@ -221,12 +222,12 @@ pub fn exact_decimal(value: f64) -> BigRational {
     }
 }
 
-/// The nearest floating-point number.
+/// The nearest double; NaN if it has none.
 pub fn nearest_f64(value: &BigRational) -> f64 {
     value.to_f64().unwrap_or(f64::NAN)
 }
 
-/// Some unknown times one, as a polynomial.
+/// Unknown `i` of `n` as a polynomial.
 pub fn unknown_polynomial(n: usize, i: usize) -> Polynomial {
     let mut polynomial = Polynomial::new(n);
     polynomial.add(TermExponents::unknown(n, i), &BigRational::one());

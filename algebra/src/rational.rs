@@ -1,4 +1,4 @@
-//! Exact rationals that stay small numbers as long as they can.
+//! Exact rationals that use machine words as long as these are sufficient.
 
 use std::fmt;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -11,14 +11,16 @@ use num_traits::{One, Signed, ToPrimitive, Zero};
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Rational(RationalRepr);
 
+/// The two representations. Every number that fits into words is `Small`, so that equal numbers are equal as values.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum RationalRepr {
     /// Numerator and positive denominator, coprime.
     Small(i64, i64),
-    /// Only what does not fit into `Small`.
+    /// Numbers that do not fit into `Small`.
     Big(Box<BigRational>),
 }
 
+/// Greatest common divisor; `a` for `b = 0`.
 fn gcd(a: u128, b: u128) -> u128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
@@ -42,8 +44,10 @@ impl Rational {
         Self(RationalRepr::Small(value, 1))
     }
 
+    /// A fraction of double words in lowest terms; the denominator must not be zero.
     fn from_wide(numerator: i128, denominator: i128) -> Self {
-        // Nearly all numbers are words and most are whole, and long division is slow.
+        // Nearly all numbers are words and most are integers, and long division is slow.
+        // The least word has no negative, so it is left to the general case.
         if let (Ok(n), Ok(d)) = (i64::try_from(numerator), i64::try_from(denominator))
             && n != i64::MIN
             && d != i64::MIN
@@ -56,8 +60,10 @@ impl Rational {
             let sign = if (x < 0) ^ (denominator < 0) { -1 } else { 1 };
             (magnitude, sign)
         };
+        // The sign goes to the numerator.
         let (n, sign) = divide(numerator);
         let d = denominator.unsigned_abs() / common;
+        // Numbers that do not fit into words become big integers.
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) => Self(RationalRepr::Small(sign * n, d)),
             _ => Self::from(BigRational::new(
@@ -67,11 +73,12 @@ impl Rational {
         }
     }
 
-    /// A fraction of words of which neither is the least one.
+    /// A fraction of words, neither of which is the least one, in lowest terms.
     fn from_words(numerator: i64, denominator: i64) -> Self {
         if denominator == 1 {
             return Self(RationalRepr::Small(numerator, 1));
         }
+        // Euclid's algorithm in words.
         let (mut common, mut rest) = (numerator.abs(), denominator.abs());
         while rest != 0 {
             (common, rest) = (rest, common % rest);
@@ -83,7 +90,7 @@ impl Rational {
         ))
     }
 
-    /// The same number as a fraction of big integers.
+    /// The same number as a fraction of big integers, in lowest terms.
     pub fn to_big(&self) -> BigRational {
         match &self.0 {
             RationalRepr::Small(n, d) => BigRational::new_raw(BigInt::from(*n), BigInt::from(*d)),
@@ -150,6 +157,7 @@ impl Rational {
         if self.is_one() || exponent == 1 {
             return self.clone();
         }
+        // A negative exponent inverts the number first.
         let base = if exponent < 0 {
             self.recip()
         } else {
@@ -174,6 +182,7 @@ impl Rational {
                 return Self(RationalRepr::Small(n, m));
             }
         }
+        // The same with big integers, if words overflow.
         let (x, y) = (self.to_big(), other.to_big());
         let n = num_gcd(&(x.numer() * y.denom()), &(y.numer() * x.denom()));
         Self::from(BigRational::new(n, x.denom() * y.denom()))
@@ -188,6 +197,7 @@ impl Rational {
     }
 }
 
+/// Greatest common divisor of big integers; 1 for two zeros.
 fn num_gcd(a: &BigInt, b: &BigInt) -> BigInt {
     let (mut a, mut b) = (a.abs(), b.abs());
     while !b.is_zero() {
@@ -200,6 +210,7 @@ fn num_gcd(a: &BigInt, b: &BigInt) -> BigInt {
 
 impl From<BigRational> for Rational {
     fn from(big: BigRational) -> Self {
+        // The numerator must have a negative that fits as well.
         match (big.numer().to_i64(), big.denom().to_i64()) {
             (Some(n), Some(d)) if n != i64::MIN => Self(RationalRepr::Small(n, d)),
             _ => Self(RationalRepr::Big(Box::new(big))),
@@ -222,6 +233,7 @@ impl From<i64> for Rational {
 impl Add for &Rational {
     type Output = Rational;
     fn add(self, other: Self) -> Rational {
+        // Sums of integers need no common denominator.
         match (&self.0, &other.0) {
             (RationalRepr::Small(a, 1), RationalRepr::Small(c, 1)) => {
                 Rational::from_wide(i128::from(*a) + i128::from(*c), 1)
@@ -280,6 +292,7 @@ impl Ord for Rational {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         match (&self.0, &other.0) {
             (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) => {
+                // Denominators are positive, so cross products compare the fractions.
                 let [a, b, c, d] = [*a, *b, *c, *d].map(i128::from);
                 (a * d).cmp(&(c * b))
             }

@@ -1,15 +1,15 @@
-//! All real roots of a polynomial in one unknown: exact coefficients go in, intervals that hold one root each come out,
-//! as narrow as is asked for.
+//! All real roots of a polynomial in one unknown: exact coefficients go in, and intervals with one root each come out,
+//! as narrow as requested.
 //!
 //! Sturm's theorem (D. E. Knuth, "The Art of Computer Programming", 4.6.1 and exercise 22 of 4.6.2).
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
-/// Coefficients, the constant first, the last of them not zero; empty for zero.
+/// Coefficients, the constant first, the last of them not zero; empty for the polynomial zero.
 pub type UnivariatePolynomial = Vec<BigRational>;
 
-/// An interval with exact ends.
+/// A closed interval with exact ends.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RationalInterval {
     /// Lower end, part of the interval.
@@ -24,12 +24,13 @@ impl RationalInterval {
         &self.high - &self.low
     }
 
-    /// Half way between the ends.
+    /// The centre of the interval.
     pub fn middle(&self) -> BigRational {
         (&self.low + &self.high) / BigRational::from_integer(2.into())
     }
 
-    /// Values of a polynomial over the interval, by Horner's rule; wider than need be, never too narrow.
+    /// An interval that contains all values of a polynomial on this one, by Horner's rule. It may be too wide, but
+    /// never too narrow.
     #[must_use]
     pub fn image(&self, polynomial: &[BigRational]) -> Self {
         let zero = BigRational::zero();
@@ -37,6 +38,7 @@ impl RationalInterval {
             low: zero.clone(),
             high: zero,
         };
+        // Interval arithmetic: the product of two intervals lies between its extreme corner products.
         for coefficient in polynomial.iter().rev() {
             let products = [
                 &image.low * &self.low,
@@ -55,13 +57,13 @@ impl RationalInterval {
     }
 }
 
-/// The real roots of a polynomial without multiple roots, in ascending order, each in an interval of its own.
+/// The real roots of a polynomial without multiple roots, each in a separate interval.
 pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     let chain = sturm_chain(polynomial);
     if polynomial.len() < 2 {
         return Vec::new();
     }
-    // Cauchy's bound.
+    // Cauchy's bound of the magnitudes of all roots.
     let leading = polynomial.last().expect("not empty").abs();
     let largest = polynomial.iter().map(Signed::abs).max().expect("not empty");
     let bound = BigRational::one() + (largest / leading).ceil();
@@ -72,10 +74,11 @@ pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     };
     let mut open = vec![whole];
     while let Some(interval) = open.pop() {
-        // Roots in (low, high].
+        // Sturm's theorem: the number of roots in (low, high].
         let count =
             sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
         match count {
+            // Intervals with several roots are halved until each has one.
             0 => {}
             1 => roots.push(interval),
             _ => {
@@ -94,8 +97,9 @@ pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     roots
 }
 
-/// Halves an interval `(low, high]` that holds one simple root.
+/// Halves an interval `(low, high]` that contains one simple root.
 pub fn halve_interval(polynomial: &[BigRational], interval: &mut RationalInterval) {
+    // A root at the upper end is exact.
     let at_high = value(polynomial, &interval.high);
     if at_high.is_zero() {
         interval.low = interval.high.clone();
@@ -106,6 +110,7 @@ pub fn halve_interval(polynomial: &[BigRational], interval: &mut RationalInterva
     if at_middle.is_zero() {
         interval.low = middle.clone();
         interval.high = middle;
+    // The half whose ends have different signs contains the root.
     } else if at_middle.is_positive() == at_high.is_positive() {
         interval.high = middle;
     } else {
@@ -113,22 +118,24 @@ pub fn halve_interval(polynomial: &[BigRational], interval: &mut RationalInterva
     }
 }
 
-/// The polynomial without its multiple roots.
+/// The polynomial with the same roots, each of them simple.
 pub fn squarefree_part(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let common = gcd(polynomial.to_vec(), derivative(polynomial));
     divide(polynomial, &common).0
 }
 
-/// Whether no root is multiple.
+/// Whether all roots are simple.
 pub fn is_squarefree(polynomial: &[BigRational]) -> bool {
     gcd(polynomial.to_vec(), derivative(polynomial)).len() <= 1
 }
 
+/// Value by Horner's rule.
 fn value(polynomial: &[BigRational], x: &BigRational) -> BigRational {
     let coefficients = polynomial.iter().rev();
     coefficients.fold(BigRational::zero(), |value, k| value * x + k)
 }
 
+/// Coefficients of the derivative.
 fn derivative(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let terms = polynomial.iter().enumerate().skip(1);
     terms
@@ -136,7 +143,7 @@ fn derivative(polynomial: &[BigRational]) -> UnivariatePolynomial {
         .collect()
 }
 
-/// Divided by the size of its leading coefficient, the sign kept: remainders stay short.
+/// The polynomial divided by the magnitude of its leading coefficient, so that remainders stay short; signs are kept.
 fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial {
     if let Some(leading) = polynomial.last().map(Signed::abs) {
         for k in &mut polynomial {
@@ -146,7 +153,7 @@ fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial 
     polynomial
 }
 
-/// Quotient and remainder.
+/// Quotient and remainder of a division; the divisor must not be zero.
 fn divide(
     polynomial: &[BigRational],
     by: &[BigRational],
@@ -155,6 +162,7 @@ fn divide(
     let leading = by.last().expect("no division by zero");
     let steps = (rest.len() + 1).saturating_sub(by.len());
     let mut quotient = vec![BigRational::zero(); steps];
+    // From the highest power down, one coefficient of the quotient at a time.
     for shift in (0..steps).rev() {
         let factor = &rest[shift + by.len() - 1] / leading;
         for (k, coefficient) in by.iter().enumerate() {
@@ -169,6 +177,7 @@ fn divide(
     (quotient, rest)
 }
 
+/// A greatest common divisor, by Euclid's algorithm.
 fn gcd(mut a: UnivariatePolynomial, mut b: UnivariatePolynomial) -> UnivariatePolynomial {
     while !b.is_empty() {
         let (_, rest) = divide(&a, &b);
@@ -178,6 +187,7 @@ fn gcd(mut a: UnivariatePolynomial, mut b: UnivariatePolynomial) -> UnivariatePo
     a
 }
 
+/// Sturm's chain: the polynomial, its derivative, and the negative remainders of each pair.
 fn sturm_chain(polynomial: &[BigRational]) -> Vec<UnivariatePolynomial> {
     let mut chain = vec![
         primitive_part(polynomial.to_vec()),
@@ -192,7 +202,7 @@ fn sturm_chain(polynomial: &[BigRational]) -> Vec<UnivariatePolynomial> {
     chain
 }
 
-/// Changes of sign along the chain.
+/// Number of changes of sign along the chain at `x`, without zeros.
 fn sign_variations(chain: &[UnivariatePolynomial], x: &BigRational) -> usize {
     let signs: Vec<bool> = chain
         .iter()

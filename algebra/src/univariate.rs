@@ -1,10 +1,11 @@
-//! Degrees of a rational function of one variable, from its values.
+//! Polynomials and rational functions of one variable, from their values at points of the prime field.
 
 use crate::field::FieldElement;
 
 /// Degrees of numerator and denominator of the rational function of least degree through the points, if the points
 /// confirm it: at least two more than it has coefficients. The abscissae must differ.
 pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(usize, usize)> {
+    // A constant function has degree zero in both polynomials.
     let n = x.len();
     if y.iter().all(|v| *v == y[0]) {
         return Some((0, 0));
@@ -16,12 +17,14 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
     });
     let (mut r0, mut r1) = (nodes, interpolate(x, y));
     let (mut t0, mut t1) = (vec![], vec![FieldElement::ONE]);
+    // The candidate with the least sum of degrees so far.
     let mut best = None;
     loop {
         trim(&mut r1);
         if r1.is_empty() {
             break;
         }
+        // The candidate with the least sum of degrees is the function, if it exists.
         let (numerator, denominator) = (r1.len() - 1, t1.len() - 1);
         if best.is_none_or(|(a, b)| numerator + denominator < a + b) {
             best = Some((numerator, denominator));
@@ -35,12 +38,15 @@ pub fn interpolant_degrees(x: &[FieldElement], y: &[FieldElement]) -> Option<(us
     best.filter(|(a, b)| a + b + 1 + 2 <= n)
 }
 
+/// Removes leading coefficients that are zero.
 fn trim(p: &mut Vec<FieldElement>) {
+    // The last coefficient is that of the highest power.
     while p.last() == Some(&FieldElement::ZERO) {
         p.pop();
     }
 }
 
+/// The product of two polynomials, lowest power first.
 fn multiply(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     if a.is_empty() || b.is_empty() {
         return Vec::new();
@@ -54,6 +60,7 @@ fn multiply(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     product
 }
 
+/// The difference of two polynomials.
 fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     let at = |p: &[FieldElement], i: usize| p.get(i).copied().unwrap_or(FieldElement::ZERO);
     (0..a.len().max(b.len()))
@@ -61,7 +68,9 @@ fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
         .collect()
 }
 
+/// Quotient and remainder; the divisor must be trimmed and not zero.
 fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<FieldElement>) {
+    // A dividend of lower degree is the remainder.
     let mut rest = a.to_vec();
     trim(&mut rest);
     if rest.len() < b.len() {
@@ -71,6 +80,7 @@ fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<Fie
         .inverse()
         .expect("a trimmed polynomial has a leading coefficient");
     let mut quotient = vec![FieldElement::ZERO; rest.len() - b.len() + 1];
+    // From the highest power down.
     for k in (0..quotient.len()).rev() {
         let factor = rest[k + b.len() - 1] * inverse;
         quotient[k] = factor;
@@ -82,9 +92,11 @@ fn divide(a: &[FieldElement], b: &[FieldElement]) -> (Vec<FieldElement>, Vec<Fie
     (quotient, rest)
 }
 
-/// The polynomial of least degree through some points, lowest power first, by Newton's divided differences.
+/// The polynomial of least degree through some points, lowest power first, by Newton's divided differences. The
+/// abscissae must differ.
 pub fn interpolate(x: &[FieldElement], y: &[FieldElement]) -> Vec<FieldElement> {
     let n = x.len();
+    // Divided differences, in place.
     let mut table = y.to_vec();
     for level in 1..n {
         for i in (level..n).rev() {
@@ -92,6 +104,7 @@ pub fn interpolate(x: &[FieldElement], y: &[FieldElement]) -> Vec<FieldElement> 
             table[i] = (table[i] - table[i - 1]) * gap;
         }
     }
+    // Newton's form is multiplied out from the highest difference.
     let mut polynomial = vec![table[n - 1]];
     for i in (0..n - 1).rev() {
         polynomial = multiply(&polynomial, &[-x[i], FieldElement::ONE]);

@@ -168,7 +168,7 @@ fn generate_module(file: &Path, options: Options) -> Result<(String, String), Bu
     let derivation = modelmill_codegen::derive(&loaded.mechanism)
         .map_err(|error| BuildError(format!("{}: {error}\n", file.display())))?;
     let fault = |error| BuildError(format!("{}: {error}\n", file.display()));
-    let mut emitted = modelmill_codegen::emit(&derivation);
+    let mut emitted = modelmill_emit::emit(&derivation);
     if options.dynamics {
         let dynamics = derivation.dynamics().map_err(fault)?;
         emitted = emitted.with_dynamics(&derivation, &dynamics);

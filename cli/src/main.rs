@@ -81,8 +81,10 @@ fn run(host: &Host, command: &ProgramCommand) -> CommandOutcome {
         ProgramCommand::Runs(args) => commands::runs::run(host, args),
         ProgramCommand::Interpret(args) => commands::interpret::run(host, args),
         ProgramCommand::Excite(args) => commands::excite::run(host, args),
+        #[cfg(feature = "experiment")]
         ProgramCommand::Experiment(args) => commands::experiment::run(host, args),
         ProgramCommand::Completions(args) => commands::completions::run(args),
+        #[cfg(feature = "workbench")]
         ProgramCommand::Work(args) => commands::work::run(host, args),
         ProgramCommand::Tour(args) => commands::tour::run(host, args),
     }

@@ -1,14 +1,16 @@
-//! Names beside what they name, each where no other name and no joint stands.
+//! Places of names in a picture: next to the object that they name, and without overlap with other names and joints.
 
-/// Height of letters in units of the picture.
+/// Height of letters, in units of the picture.
 pub(crate) const LETTER_HEIGHT: f64 = 12.0;
-/// Mean width of a letter.
+/// Mean width of a letter, in units of the picture.
 const LETTER_WIDTH: f64 = 6.4;
 
-/// A rectangle from left to right and from top to bottom.
+/// A rectangle in the picture.
 #[derive(Clone, Copy)]
 struct LabelBox {
+    /// Left and right edge.
     x: [f64; 2],
+    /// Upper and lower edge.
     y: [f64; 2],
 }
 
@@ -20,13 +22,16 @@ impl LabelBox {
     }
 }
 
-/// What is taken on a sheet.
+/// The occupied areas of a picture.
 pub(crate) struct LabelLayout {
+    /// Width and height of the picture.
     sheet: [f64; 2],
+    /// Rectangles that are occupied.
     taken: Vec<LabelBox>,
 }
 
 impl LabelLayout {
+    /// An empty picture.
     pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
             sheet: [width, height],
@@ -34,7 +39,7 @@ impl LabelLayout {
         }
     }
 
-    /// Keeps a disc free.
+    /// Marks the square around a disc as occupied.
     pub(crate) fn occupy(&mut self, [x, y]: [f64; 2], radius: f64) {
         self.taken.push(LabelBox {
             x: [x - radius, x + radius],
@@ -42,8 +47,8 @@ impl LabelLayout {
         });
     }
 
-    /// Where a name of so many letters goes, beside a place: the start of its base line, and how it is anchored. `None`
-    /// where all places near by are taken.
+    /// The place of a name with a number of letters next to a point: the start of its base line, and its anchor. `None`
+    /// if all places near the point are occupied.
     pub(crate) fn place_label(
         &mut self,
         [x, y]: [f64; 2],
@@ -51,6 +56,7 @@ impl LabelLayout {
     ) -> Option<(f64, f64, &'static str)> {
         let width = LETTER_WIDTH * letters as f64;
         let mut best: Option<(f64, (f64, f64, &'static str), LabelBox)> = None;
+        // Eight directions at two distances.
         for away in [13.0, 22.0] {
             let slanted = 0.75 * away;
             let ways = [
@@ -63,6 +69,7 @@ impl LabelLayout {
                 (0.0, -away, "middle"),
                 (0.0, away + 9.0, "middle"),
             ];
+            // The place with the least overlap is used; names must be inside the picture.
             for (dx, dy, anchor) in ways {
                 let (at_x, at_y) = (x + dx, y + dy);
                 let left = match anchor {
@@ -92,6 +99,7 @@ impl LabelLayout {
             }
         }
         let (cost, place, room) = best?;
+        // A name that would be mostly covered is left out.
         if cost > 0.4 * width * LETTER_HEIGHT {
             return None;
         }

@@ -1,32 +1,33 @@
-//! Forces of drives as arrows: along what slides or pushes, around what turns, as long as they are large, in the colour of how
-//! far a model is off there.
+//! Forces of drives as arrows: straight for prismatic joints and linear drives, circular for revolute joints. Their
+//! length shows the force, and their colour shows the error of a model.
 
 use crate::scene::{JointMark, MarkShape, SceneMark};
 use crate::symbols::polygon;
 
-/// The force or torque of a drive at one moment.
+/// The force or torque of a drive at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DriveArrow {
-    /// The drive.
+    /// Name of the drive.
     pub drive: String,
-    /// The force as a share of the largest that is shown, from -1 to 1.
+    /// The force as a share of the largest one in the picture, from -1 to 1.
     pub force: f64,
-    /// How far a model is off, as a share of the largest error that is shown, from 0 to 1.
+    /// The error of a model as a share of the largest error in the picture, from 0 to 1.
     pub error: f64,
 }
 
 /// Length of the longest straight arrow, in units of the picture.
 const LONGEST_ARROW: f64 = 60.0;
-/// Radius of an arrow around a joint, and the longest turn of one, rad.
+/// Radius of an arrow around a joint, in units of the picture.
 const ARC_RADIUS: f64 = 19.0;
+/// Largest angle of an arrow around a joint, rad.
 const LARGEST_ARC: f64 = 5.0;
-/// Shades from no error to the largest one; the style has a colour for each.
+/// Number of shades from no error to the largest one; the style has a colour for each.
 const SHADES: f64 = 6.0;
-/// What is smaller than this is no arrow, in units of the picture.
+/// Shorter arrows are left out, in units of the picture.
 const SHORTEST_ARROW: f64 = 3.0;
 
-/// The arrow of a load at the mark of its drive; nothing where the mark is another one. `at` and `direction` tell where places
-/// and directions lie in the picture, `towards` which part of a direction points at the viewer.
+/// The arrow of a load at the mark of its drive; empty for other marks. `at` and `direction` project places and
+/// directions onto the picture, and `towards` returns the component of a direction towards the viewer.
 pub(crate) fn drive_arrow(
     mark: &SceneMark,
     load: &DriveArrow,
@@ -34,6 +35,7 @@ pub(crate) fn drive_arrow(
     direction: impl Fn(&nalgebra::Vector3<f64>) -> [f64; 2],
     towards: impl Fn(&nalgebra::Vector3<f64>) -> f64,
 ) -> String {
+    // A force that is not finite is drawn as zero; an error that is not finite as the largest.
     let force = if load.force.is_finite() {
         load.force.clamp(-1.0, 1.0)
     } else {
@@ -67,6 +69,7 @@ pub(crate) fn drive_arrow(
     format!("<g class=\"load e{shade:.0}\">{drawn}</g>\n")
 }
 
+/// The arrow of a joint: along its axis if it is prismatic, else around it.
 fn joint_arrow(
     joint: &JointMark,
     at: [f64; 2],
@@ -78,11 +81,11 @@ fn joint_arrow(
         let length = axis[0].hypot(axis[1]);
         return straight_arrow(at, axis, force * length.max(0.2));
     }
-    // Seen from the tip of its axis, a positive torque turns to the left.
+    // Seen from the tip of its axis, a positive torque turns counter-clockwise.
     circular_arrow(at, if towards < 0.0 { -force } else { force })
 }
 
-/// An arrow from `from` on; a negative force points back at it.
+/// A straight arrow that begins at `from`; for a negative force it ends there.
 fn straight_arrow(from: [f64; 2], along: [f64; 2], force: f64) -> String {
     let by = LONGEST_ARROW * force;
     if by.abs() < SHORTEST_ARROW {
@@ -106,7 +109,7 @@ fn straight_arrow(from: [f64; 2], along: [f64; 2], force: f64) -> String {
     )
 }
 
-/// An arrow around a joint, to the left where it is positive; it begins at the right.
+/// An arrow around a joint, counter-clockwise for a positive force, which begins at the right of the joint.
 fn circular_arrow(at: [f64; 2], force: f64) -> String {
     let turn = LARGEST_ARC * force;
     if turn.abs() * ARC_RADIUS < SHORTEST_ARROW {
@@ -119,6 +122,7 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
         ]
     };
     let (start, end) = (place(0.0), place(turn));
+    // The tangent of the circle at the end.
     let along = [-turn.signum() * turn.sin(), -turn.signum() * turn.cos()];
     format!(
         "<path d=\"M{:.1} {:.1}A{ARC_RADIUS} {ARC_RADIUS} 0 {} {} {:.1} {:.1}\"/>{}",
@@ -132,6 +136,7 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
     )
 }
 
+/// A triangle at the tip of an arrow.
 fn arrow_head(tip: [f64; 2], along: [f64; 2]) -> String {
     let across = [-along[1], along[0]];
     let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);

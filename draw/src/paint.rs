@@ -1,4 +1,4 @@
-//! A scene as SVG without scripts: everything sorted from far to near, each thing with its name on demand.
+//! A scene as SVG without scripts: all marks sorted from far to near, each with its description as a title.
 
 use std::fmt::Write as _;
 
@@ -11,27 +11,27 @@ use crate::scene::{MarkShape, MechanismScene, SceneMark};
 use crate::symbols::{self, SymbolPlace};
 use crate::view::ViewDirection;
 
-/// Colours and strokes; they follow the reader's wish for light or dark.
+/// Colours and strokes, for light and dark mode.
 const STYLE: &str = include_str!("picture.css");
-/// Room around the mechanism, in units of the picture.
+/// Margin around the mechanism, in units of the picture.
 const MARGIN: f64 = 46.0;
-/// What makes a file of SVG one.
+/// The namespace that a stand-alone SVG file needs.
 const NAMESPACE: &str = " xmlns=\"http://www.w3.org/2000/svg\"";
-/// How far each layer of signs stands before the one below it, in units of the picture.
+/// Distance of each layer of symbols in front of the one below it, in units of the picture.
 const LAYER_SPACING: f64 = 8.0;
-/// Colours of bodies in the style.
+/// Number of colours of bodies in the style.
 const COLOURS: usize = 8;
 
-/// How a picture is made.
+/// Options of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DrawingStyle {
-    /// Width in units of the picture; it grows and shrinks with the page.
+    /// Width in units of the picture; it is scaled with the page.
     pub width: f64,
-    /// Height in the same.
+    /// Height in units of the picture.
     pub height: f64,
-    /// Whether names always show; else under the pointer only.
+    /// Whether names are always visible; otherwise only under the pointer.
     pub names: bool,
-    /// Whether frames show their axes.
+    /// Whether the axes of frames are drawn.
     pub frames: bool,
 }
 
@@ -46,14 +46,14 @@ impl Default for DrawingStyle {
     }
 }
 
-/// Scenes over each other, seen from one place: the last one in colour, those before it as shadows.
+/// Scenes on top of each other, in one view: the last one in colour, those before it as shadows.
 ///
-/// The text begins with `<svg`, carries its style, and can stand in a page or a file.
+/// The text begins with `<svg`, contains its style, and can be part of a page or a file.
 pub fn svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle) -> String {
     loaded_svg(scenes, view, style, &[])
 }
 
-/// The same with forces of drives as arrows over the last scene.
+/// The same with forces of drives as arrows over the last scene. Empty if there are no scenes.
 pub fn loaded_svg(
     scenes: &[&MechanismScene],
     view: &ViewDirection,
@@ -84,7 +84,7 @@ pub fn loaded_svg(
     )
 }
 
-/// The same as a part of a page of HTML, which needs no namespace.
+/// The same as a part of an HTML page, which needs no namespace.
 pub fn inline_svg(
     scenes: &[&MechanismScene],
     view: &ViewDirection,
@@ -93,7 +93,7 @@ pub fn inline_svg(
     svg(scenes, view, style).replacen(NAMESPACE, "", 1)
 }
 
-/// What a picture shows, for those who cannot see it.
+/// A description of a picture for readers who cannot see it.
 fn describe_scene(scene: &MechanismScene) -> String {
     let count = |is: fn(&MarkShape) -> bool| scene.marks.iter().filter(|m| is(&m.shape)).count();
     let kinds = [
@@ -105,6 +105,7 @@ fn describe_scene(scene: &MechanismScene) -> String {
         ("closed loop", count(|s| matches!(s, MarkShape::Closing(_)))),
         ("lumped mass", count(|s| matches!(s, MarkShape::Lump(..)))),
     ];
+    // Several marks of a kind are counted in the plural.
     let counts = kinds.iter().filter(|(_, n)| *n > 0).map(|(what, n)| {
         let many = match (n, what.strip_suffix("between points")) {
             (1, _) => (*what).to_owned(),
@@ -118,20 +119,24 @@ fn describe_scene(scene: &MechanismScene) -> String {
     format!("{}: {}", scene.title, counts.join(", "))
 }
 
-/// The sheet: where metres lie on it.
+/// The sheet of a picture: the projection of metres onto it.
 struct DrawingSheet<'a> {
+    /// The direction of view.
     view: &'a ViewDirection,
+    /// Options of the picture.
     style: &'a DrawingStyle,
-    /// Units of the picture for a metre.
+    /// Units of the picture per metre.
     scale: f64,
-    /// What lies in the middle, in m to the right and up.
+    /// The projected centre of all marks, m to the right and up.
     middle: [f64; 2],
-    /// The largest mass, kg, beside which others are drawn.
+    /// The largest mass, kg, relative to which others are drawn.
     heaviest: f64,
 }
 
 impl<'a> DrawingSheet<'a> {
+    /// A sheet on which all scenes fit.
     fn new(scenes: &[&MechanismScene], view: &'a ViewDirection, style: &'a DrawingStyle) -> Self {
+        // The projected range of all marks.
         let mut range = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         let mut heaviest = 0.0_f64;
         for mark in scenes.iter().flat_map(|scene| &scene.marks) {
@@ -144,6 +149,7 @@ impl<'a> DrawingSheet<'a> {
                 heaviest = heaviest.max(mass.abs());
             }
         }
+        // The scale at which that range fits within the margins.
         let room = [
             style.width - 2.0 * MARGIN,
             style.height - 2.0 * MARGIN - 16.0,
@@ -165,7 +171,7 @@ impl<'a> DrawingSheet<'a> {
         }
     }
 
-    /// Where a place lies in the picture.
+    /// The place of a point in the picture.
     fn project_point(&self, at: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(at);
         [
@@ -174,17 +180,18 @@ impl<'a> DrawingSheet<'a> {
         ]
     }
 
-    /// How a direction points in the picture, y downwards.
+    /// The projection of a direction, with y downwards.
     fn project_direction(&self, v: &Vector3<f64>) -> [f64; 2] {
         let [right, up] = self.view.project(v);
         [right, -up]
     }
 
-    /// All marks of a scene, from far to near.
+    /// All marks of a scene, in the order in which they are drawn.
     fn paint_scene(&self, scene: &MechanismScene) -> String {
         let towards = self.view.viewer_direction();
         let mut drawn: Vec<(u8, f64, String)> = Vec::new();
         for mark in &scene.marks {
+            // The mean depth of a mark's places.
             let places = mark.shape.places();
             let depth = places.iter().map(|at| at.dot(&towards)).sum::<f64>() / places.len() as f64;
             let drawing = self.paint_mark(scene, mark);
@@ -194,8 +201,8 @@ impl<'a> DrawingSheet<'a> {
             let title = escape(&mark.description);
             let colour = body_colour(mark.body);
             let group = format!("<g class=\"{colour}\"><title>{title}</title>{drawing}</g>\n");
-            // In a plane nothing hides anything, so kinds lie over each other in an order of their own; in space signs stand
-            // a little before the bars that they sit on.
+            // In a plane nothing is hidden, so the kinds of marks are drawn in a fixed order. In space, symbols are
+            // drawn slightly in front of the bars on which they are.
             let layer = drawing_layer(&mark.shape);
             if scene.plane.is_some() {
                 drawn.push((layer, 0.0, group));
@@ -208,7 +215,7 @@ impl<'a> DrawingSheet<'a> {
         drawn.into_iter().map(|(.., group)| group).collect()
     }
 
-    /// Arrows of forces.
+    /// Arrows of all loads.
     fn paint_drive_arrows(&self, scene: &MechanismScene, loads: &[DriveArrow]) -> String {
         let towards = self.view.viewer_direction();
         let mut out = String::new();
@@ -226,6 +233,7 @@ impl<'a> DrawingSheet<'a> {
         out
     }
 
+    /// The drawing of one mark; empty if it is not visible.
     fn paint_mark(&self, scene: &MechanismScene, mark: &SceneMark) -> String {
         let spot = |at: &Vector3<f64>| SymbolPlace {
             at: self.project_point(at),
@@ -275,13 +283,15 @@ impl<'a> DrawingSheet<'a> {
         }
     }
 
-    /// Radius of a mass: its area grows with the mass.
+    /// Radius of a mass in units of the picture: its area grows with the mass.
     fn mass_radius(&self, mass: f64) -> f64 {
         4.0 + 8.0 * (mass.abs() / self.heaviest).sqrt()
     }
 
+    /// A bar or thin line; empty if it points at the viewer.
     fn paint_segment(&self, class: &str, ends: &[Vector3<f64>; 2], is_ground: bool) -> String {
         let [a, b] = ends.each_ref().map(|at| self.project_point(at));
+        // Shorter than half a unit of the picture.
         if (a[0] - b[0]).hypot(a[1] - b[1]) < 0.5 {
             return String::new();
         }
@@ -289,7 +299,7 @@ impl<'a> DrawingSheet<'a> {
         symbols::line(class, a, b)
     }
 
-    /// Gravity, the axes of the base, and a length.
+    /// Gravity, the axes of the base, and a scale bar.
     fn paint_axes_and_scale_bar(&self, scene: &MechanismScene) -> String {
         let (width, height) = (self.style.width, self.style.height);
         let mut out = String::from("<g class=\"furniture\">");
@@ -309,6 +319,7 @@ impl<'a> DrawingSheet<'a> {
             28.0,
             ["x", "y", "z"],
         ));
+        // A round length of about a fifth of the width.
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
         _ = writeln!(
@@ -323,9 +334,10 @@ impl<'a> DrawingSheet<'a> {
         out
     }
 
-    /// Names of joints, points, loops and drives, where there is room.
+    /// Names of joints, points and drives, where there is room.
     fn paint_labels(&self, scene: &MechanismScene) -> String {
         let mut labels = LabelLayout::new(self.style.width, self.style.height);
+        // Joints, masses and closures must not be covered.
         for mark in &scene.marks {
             let taken = match &mark.shape {
                 MarkShape::Joint(joint) => Some((&joint.at, 12.0)),
@@ -367,7 +379,7 @@ impl<'a> DrawingSheet<'a> {
     }
 }
 
-/// The colour of a body; the ground has one of its own.
+/// The class of a body's colour; the base has a class of its own.
 fn body_colour(body: usize) -> String {
     match body {
         0 => "ground".to_owned(),
@@ -375,7 +387,7 @@ fn body_colour(body: usize) -> String {
     }
 }
 
-/// What lies over what in a plane.
+/// The layer of a mark in a planar picture, from back to front.
 fn drawing_layer(shape: &MarkShape) -> u8 {
     match shape {
         MarkShape::Ground(_) => 0,
@@ -390,7 +402,7 @@ fn drawing_layer(shape: &MarkShape) -> u8 {
     }
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not above a length.
+/// The largest of 1, 2 and 5 times a power of ten that is not above `most`.
 fn round_length(most: f64) -> f64 {
     let decade = 10_f64.powf(most.log10().floor());
     let steps = [5.0, 2.0, 1.0].map(|step| step * decade);
@@ -400,7 +412,7 @@ fn round_length(most: f64) -> f64 {
         .unwrap_or(decade)
 }
 
-/// A round length with the unit that suits it.
+/// A round length with a suitable unit.
 fn length_text(length: f64) -> String {
     if length < 0.0095 {
         format!("{:.0} mm", length * 1e3)

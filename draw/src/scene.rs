@@ -1,4 +1,4 @@
-//! What stands where: a mechanism at given coordinates becomes bars, joints, loops, drives and masses in the base frame.
+//! The shapes of a mechanism: at given coordinates it becomes bars, joints, loops, drives and masses in the base frame.
 
 use modelmill_spec::{
     CoordinateIdx, DriveKind, ExactExpression, FrameIdx, FramePlacement, FrameStep, Kinematics,
@@ -8,91 +8,91 @@ use nalgebra::Vector3;
 
 use crate::plane::{convex_hull, plane_of_motion};
 
-/// A mechanism at a pose.
+/// A mechanism at one pose, as shapes to draw.
 #[derive(Clone, Debug)]
 pub struct MechanismScene {
-    /// What it is called.
+    /// The title of the mechanism, or its name.
     pub title: String,
-    /// All that is drawn.
+    /// All shapes.
     pub marks: Vec<SceneMark>,
-    /// The normal of the plane in which everything moves, if there is one.
+    /// Unit normal of the plane in which all motion takes place, if there is one.
     pub plane: Option<Vector3<f64>>,
-    /// Where gravity points; a unit vector, `None` where there is no gravity.
+    /// Direction of gravity, a unit vector in the base frame; `None` without gravity.
     pub down: Option<Vector3<f64>>,
 }
 
-/// One thing that is drawn.
+/// One shape with the object that it represents.
 #[derive(Clone, Debug)]
 pub struct SceneMark {
-    /// What it looks like.
+    /// Its geometry.
     pub shape: MarkShape,
-    /// The body that carries it; 0 is the ground.
+    /// The body that carries it; 0 is the base.
     pub body: usize,
-    /// Its name in the model file; empty where it has none.
+    /// Its name in the model file; empty if it has none.
     pub name: String,
-    /// What it is, for people.
+    /// What it is, as text for the reader.
     pub description: String,
 }
 
-/// The look of a thing; places in the base frame, m.
+/// The geometry of a shape; places in the base frame, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MarkShape {
-    /// A straight piece of a body.
+    /// A straight piece of a body, between its ends.
     Bar([Vector3<f64>; 2]),
-    /// A piece of a body that leads to a point which holds nothing.
+    /// A piece of a body that leads to a point at which nothing is connected.
     Arm([Vector3<f64>; 2]),
-    /// What something slides along: a place on it, and its direction.
+    /// The guide of a prismatic joint: a place on it, and its direction.
     Rail(Vector3<f64>, Vector3<f64>),
-    /// A flat body between three or more joints: its corners in their order.
+    /// A flat body between three or more joints: its corners in order.
     Plate(Vec<Vector3<f64>>),
-    /// A joint.
+    /// A joint with its axis.
     Joint(JointMark),
-    /// Two points that a loop holds together.
+    /// Two points that a loop connects.
     Closing(Vector3<f64>),
     /// A drive between two points.
     Drive([Vector3<f64>; 2]),
-    /// Where the ground carries something.
+    /// A place at which the base carries something.
     Ground(Vector3<f64>),
     /// A named point.
     Point(Vector3<f64>),
-    /// A lumped mass, kg.
+    /// A lumped mass: place, and mass in kg.
     Lump(Vector3<f64>, f64),
-    /// The centre of mass of a part, kg.
+    /// The centre of mass of a part: place, and mass in kg.
     Centre(Vector3<f64>, f64),
-    /// A frame with its axes.
+    /// A frame: its origin and its axes.
     Frame(Vector3<f64>, [Vector3<f64>; 3]),
 }
 
-/// A joint.
+/// A joint as it is drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointMark {
-    /// m
+    /// Place, m.
     pub at: Vector3<f64>,
-    /// Unit vector.
+    /// Direction of its axis, a unit vector.
     pub axis: Vector3<f64>,
-    /// Whether it turns about the axis.
+    /// Whether it rotates about the axis.
     pub is_revolute: bool,
-    /// Whether it slides along the axis; a screw does both.
+    /// Whether it translates along the axis; a screw does both.
     pub is_prismatic: bool,
-    /// Who moves it.
+    /// What moves it.
     pub actuation: JointActuation,
-    /// The drive on it.
+    /// Name of the drive on it.
     pub drive: Option<String>,
 }
 
-/// Who moves a joint.
+/// What moves a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointActuation {
     /// A drive on the joint itself.
     Drive,
-    /// Its coordinate is independent, but no drive sits on it.
+    /// Its coordinate is independent, but no drive acts on it.
     Independent,
-    /// The loops.
+    /// The loops: its coordinate is passive.
     Loops,
 }
 
 impl MarkShape {
-    /// All places that it touches, m.
+    /// All places of the shape, m.
     pub fn places(&self) -> Vec<Vector3<f64>> {
         match self {
             Self::Bar(ends) | Self::Arm(ends) | Self::Drive(ends) => ends.to_vec(),
@@ -110,8 +110,8 @@ impl MarkShape {
 }
 
 impl MechanismScene {
-    /// The mechanism at `coordinates`, rad and m, one for each coordinate in the order of the file (asserted); passive ones
-    /// must close the loops, which is not looked at. A wrong value is seen as a loop whose ends are apart.
+    /// The mechanism at `coordinates`, rad and m, one for each coordinate in the order of the file (asserted). Passive
+    /// ones must close the loops, which is not checked: otherwise the ends of a loop are drawn apart.
     pub fn new(mechanism: &Mechanism, coordinates: &[f64]) -> Self {
         let kinematics = Kinematics::new(mechanism);
         let poses = kinematics.poses(coordinates);
@@ -124,6 +124,7 @@ impl MechanismScene {
             anchors: vec![Vec::new()],
             marks: Vec::new(),
         };
+        // Frames come first, because they assign bodies to everything else.
         for frame in 1..mechanism.frames.len() {
             builder.add_frame(frame);
         }
@@ -136,6 +137,7 @@ impl MechanismScene {
             MarkShape::Joint(joint) => Some(joint),
             _ => None,
         });
+        // A free body leaves every plane.
         let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
         let flies = steps.any(|step| matches!(step, FrameStep::Free(_)));
         let gravity = Vector3::from(
@@ -158,7 +160,7 @@ impl MechanismScene {
     }
 }
 
-/// A value without coordinates.
+/// The value of an expression with all coordinates zero.
 fn constant_value(mechanism: &Mechanism, exact: &ExactExpression) -> f64 {
     exact.evaluate(&|symbol| match symbol {
         ModelSymbol::Coordinate(_) => 0.0,
@@ -166,19 +168,26 @@ fn constant_value(mechanism: &Mechanism, exact: &ExactExpression) -> f64 {
     })
 }
 
+/// Collects the shapes of a mechanism.
 struct Builder<'a> {
+    /// The mechanism.
     mechanism: &'a Mechanism,
+    /// Its frames as functions of the coordinates.
     kinematics: Kinematics,
+    /// Their poses at the given coordinates.
     poses: MechanismPoses,
-    /// The body of each frame.
+    /// The body that carries each frame.
     bodies: Vec<usize>,
+    /// Number of bodies, the base included.
     n_bodies: usize,
-    /// Where each body is held or holds.
+    /// Places at which each body is connected to others, m.
     anchors: Vec<Vec<Vector3<f64>>>,
+    /// All shapes so far.
     marks: Vec<SceneMark>,
 }
 
 impl Builder<'_> {
+    /// Adds a shape with its body, its name, and its description.
     fn add_mark(&mut self, shape: MarkShape, body: usize, name: &str, says: String) {
         let name = name.to_owned();
         self.marks.push(SceneMark {
@@ -189,11 +198,12 @@ impl Builder<'_> {
         });
     }
 
+    /// Pose of a frame by its index.
     fn frame_pose(&self, frame: usize) -> &FramePlacement {
         &self.poses.frames()[frame]
     }
 
-    /// A place given in a frame.
+    /// The place in the base frame of a point given in a frame, m.
     fn place_in_base(&self, frame: FrameIdx, at: &[ExactExpression; 3]) -> Vector3<f64> {
         let local = at.each_ref().map(|x| constant_value(self.mechanism, x));
         let pose = self.frame_pose(frame.0);
@@ -214,12 +224,13 @@ impl Builder<'_> {
             .iter()
             .any(|step| matches!(step, FrameStep::Free(_)))
         {
-            // Nothing holds it, so no bar leads there.
+            // A free body is not connected to its parent, so no bar leads there.
             body = self.n_bodies;
             self.n_bodies += 1;
             from = Vector3::from(pose.origin);
             self.anchors.push(vec![from]);
         }
+        // Translations become bars and coordinates become joints, in the order of the frame's steps.
         let mut next = 0;
         let mut way = pose.translations.iter().peekable();
         loop {
@@ -231,7 +242,7 @@ impl Builder<'_> {
             let Some(first) = pose.joint_axes.get(next) else {
                 break;
             };
-            // Coordinates of one step, or of a turn and a slide along one axis, are one joint.
+            // Coordinates of one step, or of a rotation and a translation along one axis, are one joint.
             let is_same = |other: &modelmill_spec::CoordinateAxis| {
                 let [a, b] = [first, other].map(|m| Vector3::from(m.axis));
                 let [p, q] = [first, other].map(|m| Vector3::from(m.origin));
@@ -246,11 +257,13 @@ impl Builder<'_> {
             next += count;
         }
         self.bodies[frame] = body;
+        // The axes of the frame are the columns of its rotation.
         let axes = [0, 1, 2].map(|j| Vector3::from_fn(|k, _| pose.rotation[k][j]));
         let shape = MarkShape::Frame(Vector3::from(pose.origin), axes);
         self.add_mark(shape, body, &own.name, format!("frame {}", own.name));
     }
 
+    /// Adds a bar of a body; its description is the name of the frame to which it belongs.
     fn add_bar(&mut self, body: usize, from: Vector3<f64>, to: Vector3<f64>, frame: usize) {
         let name = &self.mechanism.frames[frame].name;
         let says = if body == 0 {
@@ -264,7 +277,7 @@ impl Builder<'_> {
         self.add_mark(MarkShape::Bar([from, to]), body, "", says);
     }
 
-    /// A joint, behind which a body of its own begins.
+    /// Adds a joint. Behind it a new body begins, whose index `body` gets.
     fn add_joint(
         &mut self,
         together: &[modelmill_spec::CoordinateAxis],
@@ -277,6 +290,7 @@ impl Builder<'_> {
             .collect();
         let names = names.join(", ");
         let drives = &self.mechanism.drives;
+        // The drive on one of the joint's coordinates, if there is one.
         let driven_by = |c: usize| {
             let kind = DriveKind::Joint(CoordinateIdx(c));
             drives
@@ -293,6 +307,7 @@ impl Builder<'_> {
             }
             None => JointActuation::Independent,
         };
+        // Kinds of motion of its coordinates.
         let [turns, slides] = [true, false].map(|turns| {
             let mut all = together.iter();
             all.any(|moved| moved.is_rotation == turns)
@@ -318,6 +333,7 @@ impl Builder<'_> {
             actuation: moved_by,
             drive: drive.map(|drive| drive.name.clone()),
         };
+        // The joint connects the body before it with the new one.
         self.anchors[*body].push(at);
         if slides {
             self.add_mark(MarkShape::Rail(at, joint.axis), *body, "", says.clone());
@@ -328,9 +344,10 @@ impl Builder<'_> {
         self.add_mark(MarkShape::Joint(joint), *body, &names, says);
     }
 
-    /// Points, and where loops hold two of them together.
+    /// Adds points, and the closures of loops.
     fn add_points(&mut self) {
         let mechanism = self.mechanism;
+        // Whether a loop or a drive is connected to a point.
         let held = |point: usize| {
             let in_loop = mechanism
                 .loops
@@ -350,6 +367,7 @@ impl Builder<'_> {
             if held(i) {
                 self.anchors[body].push(at);
             }
+            // A bar or a thin line from the frame's origin to the point.
             if body != 0 {
                 let ends = [from, at];
                 let shape = if held(i) {
@@ -372,17 +390,19 @@ impl Builder<'_> {
             let says = format!("loop {}: {} meets {}", closed.name, names[0], names[1]);
             let body = self.bodies[mechanism.points[closed.joins[0].0].frame.0];
             self.add_mark(MarkShape::Closing(one), body, &closed.name, says.clone());
+            // At a pose that does not close the loop, both ends are drawn.
             if (one - other).norm() > 1e-6 {
                 self.add_mark(MarkShape::Closing(other), body, "", says);
             }
         }
     }
 
+    /// Place of a point in the base frame, m.
     fn point_in_base(&self, point: PointIdx) -> Vector3<f64> {
         Vector3::from(self.kinematics.point_position(&self.poses, point))
     }
 
-    /// Drives between points.
+    /// Adds drives between points.
     fn add_drives(&mut self) {
         let mechanism = self.mechanism;
         for drive in mechanism.drives.iter().chain(&mechanism.shared_drives) {
@@ -394,6 +414,7 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds lumped masses and centres of mass, also those of effects.
     fn add_masses(&mut self) {
         let mechanism = self.mechanism;
         let of_effects = mechanism.effects.iter();
@@ -409,6 +430,7 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds a lumped mass at the point where its force acts.
     fn add_lump(&mut self, lump: &LumpedMass) {
         let share = modelmill_spec::ExactExpression::Rational(lump.share.clone());
         let mass =
@@ -422,10 +444,11 @@ impl Builder<'_> {
         }
     }
 
-    /// A thin line from a frame to what hangs on it away from all bars.
+    /// Adds a thin line from a frame's origin to a place, unless the place is on a bar of the same body.
     fn add_arm(&mut self, frame: FrameIdx, at: Vector3<f64>) {
         let body = self.bodies[frame.0];
         let from = Vector3::from(self.frame_pose(frame.0).origin);
+        // A place is on a bar if its distances to both ends add up to the length.
         let is_on_bar = self.marks.iter().any(|mark| match &mark.shape {
             MarkShape::Bar([a, b]) | MarkShape::Arm([a, b]) if mark.body == body => {
                 ((at - a).norm() + (at - b).norm() - (a - b).norm()) < 1e-6
@@ -438,12 +461,14 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds the centre of mass of a part with a mass other than zero.
     fn add_centre_of_mass(&mut self, part: &ModelPart) {
         let value = |exact: &ExactExpression| constant_value(self.mechanism, exact);
         let (mass, at) = match &part.inertial {
             PartInertia::AboutCentre { mass, centre, .. } => {
                 (value(mass), self.place_in_base(part.frame, centre))
             }
+            // The centre is the first moment divided by the mass.
             PartInertia::Linear {
                 mass, first_moment, ..
             } => {
@@ -465,7 +490,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Bodies that are held at three or more places of a plane are plates.
+    /// Adds plates for bodies that are connected at three or more places of one plane.
     fn add_plates(&mut self) {
         for body in 1..self.n_bodies {
             if let Some(corners) = convex_hull(&self.anchors[body]) {
@@ -478,6 +503,7 @@ impl Builder<'_> {
         }
     }
 
+    /// Adds the symbol of the base at every place where it is connected, each once.
     fn add_ground(&mut self) {
         let mut places: Vec<Vector3<f64>> = Vec::new();
         for at in &self.anchors[0] {
@@ -491,7 +517,7 @@ impl Builder<'_> {
     }
 }
 
-/// The ends of a drive between points; none of one on a joint.
+/// The points of a drive between points; empty for a drive on a joint.
 fn drive_ends(kind: DriveKind) -> Vec<PointIdx> {
     match kind {
         DriveKind::Linear { from, to } => vec![from, to],

@@ -1,5 +1,7 @@
-//! Effects that join a model which was read: entries beside those of its file, of which nothing is written and nothing is
-//! read again.
+//! Effects that are added to a loaded model, as if its file had the same entries.
+//!
+//! No file is written, and no file is read again: the entries of the loaded model are copied, extended and built
+//! anew.
 
 use crate::build::build;
 use crate::diagnostic::{DiagnosticLog, SourceSpan};
@@ -13,16 +15,16 @@ use crate::schema::{ConstantEntry, EffectEntry, EffectParameterEntry};
 use crate::unit::ModelUnit;
 use crate::values::{SpannedName, SpannedNumber, SpannedText};
 
-/// An effect that shall join a model.
+/// An effect to be added to a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AddedEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts.
+    /// Names of the places on which it acts.
     pub at: Vec<String>,
-    /// Symbols of parameters with the names that they get; others are called `symbol_place`.
+    /// Symbols of parameters with the names that they get; the names of all others are `symbol_place`.
     pub parameters: Vec<(String, String)>,
-    /// Symbols of constants with their values; others have those of the kind.
+    /// Symbols of constants with their values; all others have the defaults of the kind.
     pub constants: Vec<(String, ConstantValue)>,
 }
 
@@ -35,7 +37,7 @@ pub enum ConstantValue {
     Named(String),
 }
 
-/// Where what is in no file stands.
+/// The place of entries that are in no file.
 const NOWHERE: SourceSpan = SourceSpan {
     file: usize::MAX,
     start: 0,
@@ -43,16 +45,17 @@ const NOWHERE: SourceSpan = SourceSpan {
 };
 
 impl LoadedModel {
-    /// The mechanism with further constants and effects, which come behind those that it has.
+    /// The mechanism with further constants and effects, which follow those that it has.
     ///
-    /// Fails with what is wrong, as a file with these entries would: a name that is taken, an unknown kind or place, a
-    /// value that is missing.
+    /// Fails with the findings that a file with these entries would have: a name that is taken, an unknown kind or
+    /// place, or a missing value.
     pub fn with_additions(
         &self,
         constants: &[ModelConstant],
         effects: &[AddedEffect],
     ) -> Result<Mechanism, LoadFailure> {
         let mut log = DiagnosticLog::default();
+        // The loaded model stays unchanged; its entries are copied.
         let mut model = self.entries.model.clone();
         let table = model.constants.get_or_insert_with(|| NamedEntries {
             entries: Vec::new(),
@@ -70,6 +73,7 @@ impl LoadedModel {
         for added in effects {
             list.entries.push(effect(added, &mut log));
         }
+        // The same checks as for a file, with the libraries that were read for it.
         let (mechanism, _) = build(&model, &self.entries.libraries, &mut log);
         mechanism.ok_or_else(|| LoadFailure {
             diagnostics: log.finish(),
@@ -78,6 +82,7 @@ impl LoadedModel {
     }
 }
 
+/// A key that is in no file.
 fn key(text: &str) -> TomlKey {
     TomlKey {
         name: text.to_owned(),
@@ -85,6 +90,7 @@ fn key(text: &str) -> TomlKey {
     }
 }
 
+/// A name that is in no file.
 fn name(text: &str) -> SpannedName {
     SpannedName {
         text: text.to_owned(),
@@ -92,6 +98,7 @@ fn name(text: &str) -> SpannedName {
     }
 }
 
+/// The entry of a constant; a unit that cannot be parsed is reported.
 fn constant(constant: &ModelConstant, log: &mut DiagnosticLog) -> ConstantEntry {
     ConstantEntry {
         span: NOWHERE,
@@ -108,7 +115,9 @@ fn constant(constant: &ModelConstant, log: &mut DiagnosticLog) -> ConstantEntry 
     }
 }
 
+/// The entry of an effect.
 fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
+    // Parameters get names only; their nominal values stay zero.
     let named = |name_of: &str| EffectParameterEntry {
         span: NOWHERE,
         name: Some(name(name_of)),
@@ -131,6 +140,7 @@ fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
                 .collect(),
             faulty: Vec::new(),
         }),
+        // Without values of its own the effect has no table of constants, so that it is compared with its twins.
         constants: (!added.constants.is_empty()).then(|| NamedEntries {
             entries: constants
                 .filter_map(|(symbol, value)| Some((key(symbol), formula(value, log)?)))
@@ -142,6 +152,7 @@ fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
     }
 }
 
+/// The formula of a constant's value; `None` if a number cannot be parsed, which is reported.
 fn formula(value: &ConstantValue, log: &mut DiagnosticLog) -> Option<SourceFormula> {
     Some(match value {
         ConstantValue::Named(name) => SourceFormula {
@@ -152,7 +163,7 @@ fn formula(value: &ConstantValue, log: &mut DiagnosticLog) -> Option<SourceFormu
             },
         },
         ConstantValue::Number(value) => {
-            // The decimal that a file would have, so that both mean the same rational number.
+            // The decimal that a file would contain, so that both give the same rational number.
             let text = format!("{value:?}");
             let ast = parse(&text, NOWHERE, None, log)?;
             SourceFormula { text, ast }

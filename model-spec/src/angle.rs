@@ -1,7 +1,7 @@
-//! Angles and lengths of joints: expressions of a special shape, which the symbolic kernel needs.
+//! Angles and lengths of joints: expressions of the special shapes that symbolic derivation needs.
 //!
-//! An angle is an integer combination of angle symbols plus a multiple of pi/12; a length is linear in prismatic
-//! coordinates. What has another shape is reported with the shape that was expected.
+//! An angle is an integer combination of angle symbols plus a multiple of pi/12. A length is linear in prismatic
+//! coordinates. Any other shape is reported together with the expected one.
 
 use std::collections::BTreeMap;
 
@@ -17,9 +17,12 @@ use crate::unit::UnitDimension;
 
 /// Largest integer factor of an angle's symbol.
 const LARGEST_FACTOR: i32 = 16;
+/// Sorts of names that angles and lengths may use.
 const SYMBOLS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Coordinate];
 
-/// Reads an angle over constants (unit rad) and coordinates.
+/// Reads an angle over constants with unit rad and coordinates.
+///
+/// `None` after a fault: an unknown name, a constant that is not an angle, or another shape.
 pub(crate) fn angle(
     formula: &SourceFormula,
     scope: &FormulaScope,
@@ -31,10 +34,10 @@ pub(crate) fn angle(
         dimension: UnitDimension::ONE,
         what: "this angle",
     };
-    // Unknown names and pure clashes of units are found first; then only the shape is left to look at.
+    // Unknown names and wrong units are reported first; after that only the shape can be at fault.
     check_angle_symbols(&formula.ast, scope, log);
     if log.n_errors() > before {
-        // The names that are no angles at all are reported by now; add the unknown ones.
+        // Constants that are not angles are reported by now; unknown names are added.
         let mut rest = DiagnosticLog::default();
         if scope
             .resolve_ast(&formula.ast, &SYMBOLS, &mut rest)
@@ -46,30 +49,36 @@ pub(crate) fn angle(
         }
         return None;
     }
+    // Dimensions and values of the complete expression.
     scope.resolve(formula, wanted, log)?;
+    // The shape: a multiple of pi, and a factor for each symbol.
     let mut sum = ExactAngleSum::default();
     collect_angle(&formula.ast, &BigRational::one(), scope, &mut sum, log)?;
     let twelve = BigRational::from_integer(BigInt::from(12));
+    // Only these angles have sines and cosines with square roots of 2 and 3.
     if !(&sum.pi * &twelve).is_integer() {
         log.push(
             Diagnostic::error(
                 formula.ast.span,
-                "the fixed part of this angle is no multiple of pi/12",
+                "the fixed part of this angle is not a multiple of pi/12",
             )
             .label("expected for example `pi/2`, `-pi/6` or `5*pi/12`")
             .help("declare any other angle as a constant with unit `rad` and use its name"),
         );
         return None;
     }
-    // Full turns are no difference.
+    // Full turns are dropped, so that equal angles are equal as values: pi is in (-1, 1].
     let two = BigRational::from_integer(BigInt::from(2));
     let turns = (&sum.pi / &two).round();
     let mut pi = sum.pi - turns * &two;
+    // Minus half a turn equals half a turn.
     if pi == -BigRational::one() {
         pi = BigRational::one();
     }
+    // Factors must be integers, so that sines of multiple angles expand into powers.
     let mut terms = Vec::new();
     for (symbol, factor) in sum.terms {
+        // A factor that cancels to zero drops its symbol.
         let whole = factor.is_integer().then(|| factor.to_i32()).flatten();
         match whole {
             Some(0) => {}
@@ -78,12 +87,12 @@ pub(crate) fn angle(
                 log.push(
                     Diagnostic::error(
                         formula.ast.span,
-                        "this angle has a factor that is no small integer",
+                        "this angle has a factor that is not a small integer",
                     )
                     .label(format!(
                         "expected integer multiples, at most {LARGEST_FACTOR}, of angles"
                     ))
-                    .help("halves of an angle: make the half the coordinate, and the whole twice of it"),
+                    .help("for half angles, declare the half as the coordinate and write the full angle as twice that"),
                 );
                 return None;
             }
@@ -92,7 +101,7 @@ pub(crate) fn angle(
     Some(ExactAngle { pi, terms })
 }
 
-/// Reports symbols that are pure numbers or lengths where angles must stand.
+/// Reports constants that are pure numbers or lengths in an angle.
 fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut DiagnosticLog) {
     match &ast.kind {
         FormulaAstKind::Name(name) => {
@@ -101,8 +110,9 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
                 && meaning.unit != "rad"
                 && meaning.dimension.is_some()
             {
+                // Marked as used, so that it is not reported a second time as unused.
                 meaning.used.set(true);
-                let diagnostic = Diagnostic::error(ast.span, format!("`{name}` is no angle"))
+                let diagnostic = Diagnostic::error(ast.span, format!("`{name}` is not an angle"))
                     .label(format!("its unit is `{}`, expected `rad`", meaning.unit));
                 log.push(match meaning.declared {
                     Some(declared) => diagnostic.related(declared, "defined here"),
@@ -110,6 +120,7 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
                 });
             }
         }
+        // All operands are checked, so that each wrong constant is reported.
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             for one in inner {
                 check_angle_symbols(one, scope, log);
@@ -128,12 +139,18 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
     }
 }
 
+/// An angle while its terms are collected.
 #[derive(Default)]
 struct ExactAngleSum {
+    /// Coefficient of pi.
     pi: BigRational,
+    /// Factor of each symbol.
     terms: BTreeMap<ModelSymbol, BigRational>,
 }
 
+/// Adds `factor` times an expression to `sum`; `None` after a fault, which is reported.
+///
+/// `factor` is the product of the numbers and signs on the path to this node.
 fn collect_angle(
     ast: &FormulaAst,
     factor: &BigRational,
@@ -143,6 +160,7 @@ fn collect_angle(
 ) -> Option<()> {
     match &ast.kind {
         FormulaAstKind::Rational(value) if value.is_zero() => Some(()),
+        // A bare number could be degrees, so only multiples of pi are accepted.
         FormulaAstKind::Rational(_) => {
             log.push(
                 Diagnostic::error(ast.span, "an angle cannot be a bare number")
@@ -155,6 +173,7 @@ fn collect_angle(
             sum.pi += factor;
             Some(())
         }
+        // Each use of a symbol adds to its factor.
         FormulaAstKind::Name(name) => {
             let meaning = scope.get(name)?;
             let ExactExpression::Symbol(symbol) = meaning.exact else {
@@ -171,6 +190,7 @@ fn collect_angle(
             fine.then_some(())
         }
         FormulaAstKind::Negative(inner) => collect_angle(inner, &-factor, scope, sum, log),
+        // Numbers in a product join the factor; exactly one other member may remain.
         FormulaAstKind::Product(factors) => {
             let (numbers, rest): (Vec<&FormulaAst>, Vec<&FormulaAst>) = factors
                 .iter()
@@ -190,6 +210,7 @@ fn collect_angle(
     }
 }
 
+/// Reports a shape that an angle cannot have.
 fn report_angle_shape(ast: &FormulaAst, log: &mut DiagnosticLog) -> Option<()> {
     log.push(
         Diagnostic::error(ast.span, "an angle cannot be computed like this")
@@ -199,7 +220,9 @@ fn report_angle_shape(ast: &FormulaAst, log: &mut DiagnosticLog) -> Option<()> {
     None
 }
 
-/// Reads a length that is linear in coordinates.
+/// Reads a length that is linear in coordinates, with rational factors; `what` names it in messages.
+///
+/// `None` after a fault, which is reported.
 pub(crate) fn length(
     formula: &SourceFormula,
     scope: &FormulaScope,
@@ -214,6 +237,7 @@ pub(crate) fn length(
     let exact = scope.resolve(formula, wanted, log)?;
     let mut offset = Vec::new();
     let mut coordinates: BTreeMap<_, BigRational> = BTreeMap::new();
+    // The offset is a list of terms here, and one expression below.
     if !split_length(&exact, &BigRational::one(), &mut offset, &mut coordinates) {
         log.push(
             Diagnostic::error(
@@ -224,6 +248,7 @@ pub(crate) fn length(
         );
         return None;
     }
+    // Coordinates that cancel are dropped.
     coordinates.retain(|_, factor| !factor.is_zero());
     let offset = match offset.len() {
         0 => ExactExpression::zero(),
@@ -236,12 +261,14 @@ pub(crate) fn length(
     })
 }
 
+/// Splits `factor * exact` into terms without coordinates and factors of coordinates; false if it is not linear.
 fn split_length(
     exact: &ExactExpression,
     factor: &BigRational,
     offset: &mut Vec<ExactExpression>,
     coordinates: &mut BTreeMap<crate::CoordinateIdx, BigRational>,
 ) -> bool {
+    // Parts without coordinates belong to the offset.
     if !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Coordinate(_))) {
         if !exact.is_zero() {
             offset.push(scale_exact(exact, factor));
@@ -249,6 +276,7 @@ fn split_length(
         return true;
     }
     match exact {
+        // A coordinate by itself: the accumulated factor belongs to it.
         ExactExpression::Symbol(ModelSymbol::Coordinate(coordinate)) => {
             *coordinates.entry(*coordinate).or_default() += factor;
             true
@@ -257,6 +285,7 @@ fn split_length(
             .iter()
             .all(|term| split_length(term, factor, offset, coordinates)),
         ExactExpression::Negative(inner) => split_length(inner, &-factor, offset, coordinates),
+        // Rational members join the factor; at most one other member may remain.
         ExactExpression::Product(factors) => {
             let mut scale = factor.clone();
             let mut rest = None;
@@ -273,7 +302,7 @@ fn split_length(
     }
 }
 
-/// A rational multiple of an expression, in its plainest form.
+/// A rational multiple of an expression, without factors of one or minus one.
 fn scale_exact(exact: &ExactExpression, factor: &BigRational) -> ExactExpression {
     if factor.is_one() {
         return exact.clone();
@@ -291,7 +320,7 @@ fn scale_exact(exact: &ExactExpression, factor: &BigRational) -> ExactExpression
     }
 }
 
-/// The value of an expression that holds only numbers, as a rational; `None` where it holds anything else.
+/// The value of an expression of numbers only, as a rational; `None` if it contains anything else or divides by zero.
 pub(crate) fn rational_value(ast: &FormulaAst) -> Option<BigRational> {
     match &ast.kind {
         FormulaAstKind::Rational(value) => Some(value.clone()),

@@ -1,5 +1,7 @@
-//! A mechanism for its file's values alone: constants become numbers, so that whatever is special about them is there for
-//! all that follows: lengths that are zero or equal, axes that are parallel.
+//! A mechanism at the values of its file: constants become numbers, so that their special values are visible to all
+//! later stages, such as lengths that are zero or equal, and parallel axes.
+//!
+//! A [`Mechanism`] goes in, one with fewer constants comes out. Its geometry is the same up to rounding.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -10,28 +12,30 @@ use crate::mechanism::{
     EffectBodies, FrameStep, LumpedMass, Mechanism, ModelConstant, ModelPart, PartInertia,
 };
 
-/// How many significant digits every decimal keeps as a number of the machine; what stands behind them is rounding.
+/// Number of significant digits of a decimal that are kept; digits behind them are rounding.
 const DIGITS: usize = 15;
 
-/// What a constant is beside the largest of the same unit where it counts as zero, and an angle beside a multiple of pi/12
-/// where it counts as that.
+/// A constant below this share of the largest of the same unit counts as zero. An angle that differs from a multiple
+/// of pi/12 by less than this share counts as that multiple.
 const ROUNDING_SHARE: f64 = 1e-15;
 
 impl Mechanism {
-    /// The same mechanism for its file's values alone.
+    /// The same mechanism with its constants replaced by their values.
     ///
-    /// Constants stand as the decimals that they are to 15 digits, and angles that are multiples of pi/12 as such. Other
-    /// angles keep their names, those of equal value one name, since their sines are no rational numbers.
+    /// Constants become decimals of 15 digits, and angles near multiples of pi/12 become these multiples. Other
+    /// angles stay constants, because their sines are not rational. Those with equal values share one constant.
     #[must_use]
     pub fn with_numeric_constants(&self) -> Self {
         let mut at = self.clone();
         let stands = ConstantSubstitutes::new(&self.constants);
+        // Only angles that stay constants are kept, under new indices.
         at.constants = stands
             .kept
             .iter()
             .map(|i| self.constants[*i].clone())
             .collect();
         at.gravity = self.gravity.each_ref().map(|x| stands.exact(x));
+        // Replace constants in every expression: frames, points, couplings, bodies and effects.
         for frame in &mut at.frames {
             for step in &mut frame.steps {
                 *step = match step {
@@ -75,27 +79,33 @@ impl Mechanism {
     }
 }
 
-/// What stands for a constant.
+/// The replacement of a constant.
 enum SubstituteValue {
+    /// A rational number.
     Number(BigRational),
-    /// A multiple of pi.
+    /// An angle, as a multiple of pi.
     Turn(BigRational),
-    /// A constant of the new mechanism.
+    /// An angle that stays a constant, by its index in the new mechanism.
     Constant(ConstantIdx),
 }
 
+/// The replacements of all constants.
 struct ConstantSubstitutes {
+    /// By index in the old mechanism.
     values: Vec<SubstituteValue>,
-    /// Constants that keep their names.
+    /// Old indices of the constants that are kept, in their new order.
     kept: Vec<usize>,
 }
 
 impl ConstantSubstitutes {
+    /// Decides for each constant by its value and its unit.
     fn new(constants: &[ModelConstant]) -> Self {
         let (mut of, mut kept): (Vec<SubstituteValue>, Vec<usize>) = Default::default();
         for constant in constants {
             if !constant.is_angle {
+                // Zero is decided relative to the largest constant of the same unit.
                 let alike = constants.iter().filter(|c| c.unit == constant.unit);
+                // Values of the same unit, this one included.
                 let largest = alike.map(|c| c.value.abs()).fold(0.0, f64::max);
                 of.push(SubstituteValue::Number(
                     if constant.value.abs() < ROUNDING_SHARE * largest {
@@ -107,6 +117,7 @@ impl ConstantSubstitutes {
                 continue;
             }
             let twelfths = constant.value * 12.0 / std::f64::consts::PI;
+            // The nearest multiple of pi/12, if the value is that multiple up to rounding.
             let whole = twelfths.round();
             if (twelfths - whole).abs() <= ROUNDING_SHARE * 12.0 * whole.abs().max(1.0) {
                 let whole = BigInt::from(whole.to_i64().unwrap_or(0));
@@ -116,6 +127,7 @@ impl ConstantSubstitutes {
                 )));
                 continue;
             }
+            // Equal angles share one constant, so that their sines are recognised as equal.
             let same =
                 |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
             let at = kept.iter().position(same).unwrap_or(kept.len());
@@ -127,12 +139,15 @@ impl ConstantSubstitutes {
         Self { values: of, kept }
     }
 
+    /// An expression with all constants replaced.
     fn exact(&self, exact: &ExactExpression) -> ExactExpression {
+        // Operands are replaced one by one; the shape of the expression stays.
         let inner = |a: &ExactExpression| Box::new(self.exact(a));
         let all = |operands: &[ExactExpression]| operands.iter().map(|a| self.exact(a)).collect();
         match exact {
             ExactExpression::Symbol(ModelSymbol::Constant(i)) => match &self.values[i.0] {
                 SubstituteValue::Number(value) => ExactExpression::Rational(value.clone()),
+                // A zero angle becomes the number zero, which later stages recognise.
                 SubstituteValue::Turn(value) if value.is_zero() => {
                     ExactExpression::Rational(value.clone())
                 }
@@ -154,9 +169,11 @@ impl ConstantSubstitutes {
         }
     }
 
+    /// An angle with its constants replaced; equal symbols are added, and the terms are sorted.
     fn angle(&self, angle: &ExactAngle) -> ExactAngle {
         let mut pi = angle.pi.clone();
         let mut terms: Vec<(ModelSymbol, i32)> = Vec::new();
+        // Terms with the same constant are added.
         for (symbol, n) in &angle.terms {
             let symbol = match symbol {
                 ModelSymbol::Constant(i) => match &self.values[i.0] {
@@ -165,7 +182,9 @@ impl ConstantSubstitutes {
                         continue;
                     }
                     SubstituteValue::Constant(i) => ModelSymbol::Constant(*i),
-                    SubstituteValue::Number(_) => unreachable!("what stands in an angle is one"),
+                    SubstituteValue::Number(_) => {
+                        unreachable!("constants in an angle have the unit rad")
+                    }
                 },
                 other => *other,
             };
@@ -179,7 +198,9 @@ impl ConstantSubstitutes {
         ExactAngle { pi, terms }
     }
 
+    /// Replaces constants in the inertias of parts and in lumped masses.
     fn bodies(&self, parts: &mut [ModelPart], lumped_masses: &mut [LumpedMass]) {
+        // Both forms of an inertia have the same quantities to replace.
         for part in parts {
             let (PartInertia::AboutCentre {
                 mass,
@@ -204,9 +225,12 @@ impl ConstantSubstitutes {
     }
 }
 
-/// The decimal that a number of the machine stands for.
+/// The decimal of 15 digits for a floating-point number, as an exact rational.
+///
+/// Panics if the number is not finite.
 fn exact_decimal(value: f64) -> BigRational {
     let digits = DIGITS - 1;
+    // The printed mantissa and exponent are read back as integers.
     let written = format!("{value:.digits$e}");
     let read = written.split_once('e').and_then(|(mantissa, exponent)| {
         let mantissa: BigInt = mantissa.replace('.', "").parse().ok()?;

@@ -1,8 +1,9 @@
-//! Columns of recordings as a model file or a command line describes them: `"q_meas_m"`, `"qm5/45"`,
-//! `"(qm6 - qm5)/32 - pi/2"`, `"pos1 [deg]"` go in, together with the names that a recording has; an affine sum of
-//! its columns in SI units comes out.
+//! Columns of recordings as a model file or a command line describes them.
 //!
-//! A text that is the name of a column, letter by letter, is that column, whatever else it could mean.
+//! A text such as `"q_meas_m"`, `"qm5/45"`, `"(qm6 - qm5)/32 - pi/2"` or `"pos1 [deg]"` and the column names of a
+//! recording go in. An affine sum of its columns in SI units comes out.
+//!
+//! A text that equals the name of a column is that column, even if it could also be an expression.
 //!
 //! Decision: this crate reads the sum and resolves it against each file, so that `modelmill-identify` gets numbers
 //! only.
@@ -20,7 +21,7 @@ use crate::mechanism::Mechanism;
 use crate::parser::parse;
 use crate::suggest;
 
-/// What a column of a recording holds.
+/// The quantity in a column of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnQuantity {
     /// Time, s.
@@ -46,11 +47,11 @@ pub enum ColumnQuantity {
 pub struct ColumnSum {
     /// Columns of the recording with their factors, none of which is zero; in the order of the text.
     pub terms: Vec<(String, f64)>,
-    /// What is added.
+    /// The constant term, in SI units.
     pub offset: f64,
 }
 
-/// Why a text describes no column of a recording.
+/// Why a text does not describe a column of a recording.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ColumnFault {
@@ -61,7 +62,7 @@ pub enum ColumnFault {
         /// The closest name that the recording has.
         nearest: Option<String>,
     },
-    /// It cannot be read, or is no affine sum of columns.
+    /// It cannot be parsed, or is not an affine sum of columns.
     Malformed {
         /// What is wrong, as a clause.
         says: String,
@@ -74,7 +75,7 @@ impl fmt::Display for ColumnFault {
             Self::Missing { column, nearest } => {
                 write!(f, "the recording has no column `{column}`")?;
                 match nearest {
-                    Some(nearest) => write!(f, "; is `{nearest}` meant?"),
+                    Some(nearest) => write!(f, "; did you mean `{nearest}`?"),
                     None => Ok(()),
                 }
             }
@@ -85,10 +86,12 @@ impl fmt::Display for ColumnFault {
 
 impl std::error::Error for ColumnFault {}
 
+/// One degree in radians.
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
+/// One turn in radians.
 const TURN: f64 = std::f64::consts::TAU;
 
-/// Units of columns with the factor that leads to SI, the SI unit first.
+/// Units of columns with their factors to SI; the SI unit comes first.
 fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
     match quantity {
         ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
@@ -128,7 +131,7 @@ fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
 }
 
 impl Mechanism {
-    /// The names that columns of recordings have in this model, with what each holds: `t`, every active coordinate
+    /// The names that columns of recordings have in this model, with their quantities: `t`, every active coordinate
     /// with its two derivatives (`_d`, `_dd`), and every drive with the variance of its force (`_var`).
     pub fn columns(&self) -> Vec<(String, ColumnQuantity)> {
         let mut columns = vec![("t".to_owned(), ColumnQuantity::Time)];
@@ -159,17 +162,17 @@ impl Mechanism {
     }
 }
 
-/// Reads the description of a column that holds `quantity`, for a recording whose columns are called `names`.
+/// Reads the description of a column with the quantity `quantity`, for a recording whose columns are called `names`.
 ///
-/// The text is the name of a column or an expression in names of columns, the model's constants (`constants` gives
-/// their values) and numbers, affine in the columns; a unit in brackets at its end, such as `[deg]`, says what it is
-/// in if not in SI units.
-/// Fails when it names a column that is not there, is not affine, or has a unit that does not suit the quantity.
+/// The text is the name of a column or an expression. An expression is affine in names of columns and may contain
+/// numbers and constants of the model, whose values `constants` gives. A unit in brackets at its end, such as
+/// `[deg]`, states the unit of the column if it is not the SI unit.
+/// Fails when it names a column that does not exist, is not affine, or has a unit that does not fit the quantity.
 ///
 /// ```
-/// use modelmill_spec::{Quantity, read_column};
+/// use modelmill_spec::{ColumnQuantity, read_column};
 /// let names = ["time_s".to_owned(), "qm5".to_owned(), "qm6".to_owned()];
-/// let sum = read_column("(qm6 - qm5)/32 [deg]", Quantity::Angle(0), &names, &|_| None)?;
+/// let sum = read_column("(qm6 - qm5)/32 [deg]", ColumnQuantity::Angle(0), &names, &|_| None)?;
 /// assert_eq!(sum.terms[1].0, "qm5");
 /// assert!((sum.terms[1].1 + std::f64::consts::PI / 180.0 / 32.0).abs() < 1e-18);
 /// # Ok::<(), modelmill_spec::ColumnFault>(())
@@ -186,6 +189,7 @@ pub fn read_column(
         offset: 0.0,
     };
     let has = |name: &str| names.iter().any(|other| other == name);
+    // The complete text comes first: a column may be called `pos [deg]`.
     if has(text) {
         return Ok(single(text, 1.0));
     }
@@ -201,6 +205,7 @@ pub fn read_column(
         column: column.to_owned(),
         nearest: suggest::nearest(column, names.iter().map(String::as_str)).map(str::to_owned),
     };
+    // Names with dots cannot be parsed; they are replaced by names that can.
     let (plain, stand_ins) = with_plain_names(body, names);
     let span = SourceSpan {
         file: 0,
@@ -209,7 +214,7 @@ pub fn read_column(
     };
     let mut log = DiagnosticLog::default();
     let Some(ast) = parse(&plain, span, None, &mut log) else {
-        // What cannot be read as an expression is taken for a name with blanks and the like.
+        // A text without operators is reported as a missing column, because names may contain blanks.
         if !body.contains(['+', '*', '/', '^', '(']) {
             return Err(missing(body));
         }
@@ -222,6 +227,7 @@ pub fn read_column(
             ),
         });
     };
+    // Names of columns take precedence over constants of the model.
     let sum = affine_value(&ast, &|name| {
         let stands_for = stand_ins.iter().find(|(stand_in, _)| stand_in == name);
         if let Some((_, column)) = stands_for {
@@ -240,7 +246,7 @@ pub fn read_column(
     })?;
     if sum.terms.is_empty() {
         return Err(ColumnFault::Malformed {
-            says: format!("`{body}` holds no column of the recording"),
+            says: format!("`{body}` contains no column of the recording"),
         });
     }
     Ok(ColumnSum {
@@ -253,19 +259,20 @@ pub fn read_column(
     })
 }
 
-/// A text in which columns whose names no expression can hold, such as `joint_states.position.elbow`, have names that it
-/// can, and what these stand for.
+/// Replaces names of columns with dots, such as `joint_states.position.elbow`, which no expression can contain.
+/// Returns the text, and each replacement with the column it stands for.
 fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String, &'a str)>) {
     let mut others: Vec<&String> = names
         .iter()
         .filter(|name| name.contains('.') && text.contains(name.as_str()))
         .collect();
-    // A name may begin another one.
+    // Longer names come first because one name may be the beginning of another.
     others.sort_by_key(|name| std::cmp::Reverse(name.len()));
     let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
     let mut plain = text.to_owned();
     let mut stand_ins = Vec::new();
     for name in others {
+        // The replacement must not occur in the text or among the columns.
         let mut stand_in = format!("column_{}", stand_ins.len());
         while text.contains(&stand_in) || names.contains(&stand_in) {
             stand_in.push('_');
@@ -273,6 +280,7 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
         let mut done = String::new();
         let mut rest = plain.as_str();
         while let Some(at) = rest.find(name.as_str()) {
+            // A match inside of a longer name is left unchanged.
             let end = at + name.len();
             let is_within = rest[end..].starts_with(is_part)
                 || rest[..at].ends_with(is_part)
@@ -288,7 +296,7 @@ fn with_plain_names<'a>(text: &str, names: &'a [String]) -> (String, Vec<(String
     (plain, stand_ins)
 }
 
-/// Why a text can be the description of no column of any recording; `None` if it can be.
+/// Why a text can describe no column of any recording; `None` if it may describe one.
 pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
     let (body, _) = split_unit(text.trim());
     let span = SourceSpan {
@@ -303,7 +311,7 @@ pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
     }
 }
 
-/// The text before a unit in brackets at its end, and the unit.
+/// Splits a unit in brackets off the end: the text before it, and the unit.
 fn split_unit(text: &str) -> (&str, Option<&str>) {
     let split = text
         .strip_suffix(']')
@@ -314,6 +322,7 @@ fn split_unit(text: &str) -> (&str, Option<&str>) {
     }
 }
 
+/// The factor from a unit to SI; fails with the list of units that fit the quantity.
 fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
     let units = units(quantity);
     let found = units.iter().find(|(name, _)| *name == unit);
@@ -321,7 +330,7 @@ fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
         .map(|(_, factor)| *factor)
         .ok_or_else(|| ColumnFault::Malformed {
             says: format!(
-                "the unit `{unit}` does not suit it; expected one of {}",
+                "the unit `{unit}` does not fit this quantity; expected one of {}",
                 units
                     .iter()
                     .map(|(name, _)| format!("`{name}`"))
@@ -331,20 +340,25 @@ fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
         })
 }
 
-/// An affine value while it is worked out.
+/// An affine value during evaluation.
 #[derive(Clone, Debug, Default)]
 struct AffineValue {
+    /// Columns with their factors; none is zero after an addition.
     terms: Vec<(String, f64)>,
+    /// The constant term.
     offset: f64,
 }
 
-/// Why an expression has no affine value.
+/// Why an expression is not affine.
 enum AffineFault {
+    /// It uses a name that is neither a column nor a constant.
     Name(String),
+    /// Any other reason, as a clause for a message.
     Says(String),
 }
 
 impl AffineValue {
+    /// A value without columns.
     fn number(offset: f64) -> Self {
         Self {
             terms: Vec::new(),
@@ -352,6 +366,7 @@ impl AffineValue {
         }
     }
 
+    /// A column with factor one.
     fn column(name: &str) -> Self {
         Self {
             terms: vec![(name.to_owned(), 1.0)],
@@ -359,6 +374,7 @@ impl AffineValue {
         }
     }
 
+    /// The sum; terms of the same column are added, and terms that cancel are dropped.
     fn add(mut self, other: Self) -> Self {
         for (name, factor) in other.terms {
             match self.terms.iter_mut().find(|(known, _)| *known == name) {
@@ -371,6 +387,7 @@ impl AffineValue {
         self
     }
 
+    /// Applies a linear function to all factors and to the constant term.
     fn map(mut self, f: impl Fn(f64) -> f64) -> Self {
         for (_, factor) in &mut self.terms {
             *factor = f(*factor);
@@ -380,12 +397,13 @@ impl AffineValue {
     }
 }
 
-/// The affine value of an expression.
+/// Evaluates an expression; `look_up` gives the value of each name.
 fn affine_value(
     ast: &FormulaAst,
     look_up: &dyn Fn(&str) -> Option<AffineValue>,
 ) -> Result<AffineValue, AffineFault> {
     let of = |ast: &FormulaAst| affine_value(ast, look_up);
+    // Divisors, bases of powers and operands of functions must be free of columns.
     let number = |ast: &FormulaAst, what: &str| {
         let value = affine_value(ast, look_up)?;
         if value.terms.is_empty() {
@@ -447,6 +465,7 @@ fn affine_value(
     }
 }
 
+/// Value of a function in floating point; the sign of zero is zero.
 fn apply_function(function: ExactFunction, x: f64) -> f64 {
     match function {
         ExactFunction::Sin => x.sin(),
@@ -507,7 +526,7 @@ mod tests {
         let says = |text: &str| read(text).unwrap_err().to_string();
         assert_eq!(
             says("qm7/45"),
-            "the recording has no column `qm7`; is `qm5` meant?"
+            "the recording has no column `qm7`; did you mean `qm5`?"
         );
         assert_eq!(says("gear box"), "the recording has no column `gear box`");
         assert!(says("qm5*qm6").contains("multiplied with each other"));
@@ -517,7 +536,10 @@ mod tests {
         assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
-        assert!(says("qm5 [mm]").contains("`mm` does not suit it; expected one of `rad`, `deg`"));
+        assert!(
+            says("qm5 [mm]")
+                .contains("`mm` does not fit this quantity; expected one of `rad`, `deg`")
+        );
     }
 
     #[test]

@@ -10,15 +10,15 @@ use annotate_snippets::renderer::DecorStyle;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use modelmill_boundary::text::{Message, RemedySpelling};
 
-/// How many diagnostics are kept; a file with more has one cause behind them.
+/// How many diagnostics are kept. A file with more usually has one common cause.
 const MOST_DIAGNOSTICS: usize = 100;
-/// Lines longer than this are named by their position and not printed.
+/// Longest line in bytes that is printed; longer ones are only named by line and column.
 const LONGEST_PRINTED_LINE: usize = 400;
 
-/// A stretch of bytes in one of the files read.
+/// A segment of bytes in one of the files read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct SourceSpan {
-    /// Index into [`Sources::files`].
+    /// Index into [`SourceFiles::files`].
     pub file: usize,
     /// First byte.
     pub start: usize,
@@ -26,12 +26,12 @@ pub struct SourceSpan {
     pub end: usize,
 }
 
-/// How grave a finding is.
+/// How serious a finding is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum DiagnosticSeverity {
-    /// The file has no meaning until this is mended.
+    /// The model cannot be built until this is corrected.
     Error,
-    /// The file has a meaning, though perhaps not the one intended.
+    /// The model can be built, though perhaps not as intended.
     Warning,
 }
 
@@ -73,14 +73,14 @@ impl Diagnostic {
         }
     }
 
-    /// Says what was expected at the marked text.
+    /// Sets the text at the marked place: what was expected there.
     #[must_use]
     pub(crate) fn label(mut self, label: impl Into<String>) -> Self {
         self.label = label.into();
         self
     }
 
-    /// Points at a second place.
+    /// Adds a second place with its own text, such as a first definition.
     #[must_use]
     pub(crate) fn related(mut self, span: SourceSpan, label: impl Into<String>) -> Self {
         self.related = Some((span, label.into()));
@@ -102,14 +102,14 @@ impl Diagnostic {
         }
     }
 
-    /// Says what to do.
+    /// Adds one sentence of advice.
     #[must_use]
     pub(crate) fn help(mut self, help: impl Into<Message>) -> Self {
         self.help.push(help.into());
         self
     }
 
-    /// Says what to do, if there is something to say.
+    /// Adds advice if there is any.
     #[must_use]
     pub(crate) fn help_if(mut self, help: Option<String>) -> Self {
         self.help.extend(help.map(Message::from));
@@ -154,17 +154,20 @@ impl SourceFiles {
 /// Collects findings while a file is read.
 #[derive(Debug, Default)]
 pub(crate) struct DiagnosticLog {
+    /// The findings that are kept, without duplicates; at most [`MOST_DIAGNOSTICS`].
     diagnostics: Vec<Diagnostic>,
+    /// Number of errors that were pushed, including those that are not kept.
     n_errors: usize,
+    /// Number of findings beyond the limit.
     n_left_off: usize,
-    /// Set while the text itself is broken: what is missing then is no news.
+    /// Set while the text itself is broken: missing entries are then not reported.
     pub(crate) syntax_broken: bool,
-    /// Where variants remove entries, by section and name: what still uses one is told so.
+    /// Where variants remove entries, by section and name; a use of a removed entry is reported with this place.
     pub(crate) removed: BTreeMap<(String, String), SourceSpan>,
 }
 
 impl DiagnosticLog {
-    /// Takes a finding.
+    /// Adds a finding, unless it is a duplicate or a consequence of another one.
     pub(crate) fn push(&mut self, diagnostic: Diagnostic) {
         if diagnostic.severity == DiagnosticSeverity::Error {
             self.n_errors += 1;
@@ -179,7 +182,7 @@ impl DiagnosticLog {
         }
     }
 
-    /// Whether the text is broken at the very place that a finding means.
+    /// Whether broken text was already reported at the place of this finding.
     fn is_consequence(&self, diagnostic: &Diagnostic) -> bool {
         let start = |one: &Diagnostic| one.span.map(|span| (span.file, span.start));
         let is_there = |one: &Diagnostic| start(one) == start(diagnostic);
@@ -206,6 +209,7 @@ impl DiagnosticLog {
 
     /// All findings in the order of their places.
     pub(crate) fn finish(mut self) -> Vec<Diagnostic> {
+        // A stable sort keeps the order of findings at the same place; those without a place come first.
         self.diagnostics
             .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
         if self.n_left_off > 0 {
@@ -216,7 +220,7 @@ impl DiagnosticLog {
                     DiagnosticSeverity::Warning
                 },
                 message: format!(
-                    "{} not shown; mend the first ones and look again",
+                    "{} not shown; correct the first ones and check again",
                     match self.n_left_off {
                         1 => "1 more finding is".to_owned(),
                         n => format!("{n} more findings are"),
@@ -232,7 +236,7 @@ impl DiagnosticLog {
     }
 }
 
-/// Renders findings one below the other, with the text they mean and advice in the words of whoever reads it.
+/// Renders findings one below the other, with the source lines and advice spelled for the reader's front end.
 pub(crate) fn render(
     diagnostics: &[Diagnostic],
     sources: &SourceFiles,
@@ -252,10 +256,11 @@ pub(crate) fn render(
     }
     text.truncate(text.trim_end().len());
     text.push('\n');
-    // Names of files and texts of users are in it.
+    // File names and source lines come from users and may contain control sequences of terminals.
     modelmill_boundary::text::terminal(&text, color).into_owned()
 }
 
+/// Renders one finding: title, marked source lines, and its advice.
 fn render_one(
     diagnostic: &Diagnostic,
     sources: &SourceFiles,
@@ -271,6 +276,7 @@ fn render_one(
     let mut group = Group::with_title(level.primary_title(diagnostic.message.as_str()));
     if let Some(span) = diagnostic.span {
         let label = Some(diagnostic.label.as_str()).filter(|label| !label.is_empty());
+        // A second place in the same file goes into the same snippet, otherwise into a snippet of its own.
         match diagnostic.related.as_ref() {
             Some((other, text)) if other.file == span.file => {
                 group = annotate_lines(
@@ -300,6 +306,7 @@ fn render_one(
     renderer.render(&[group])
 }
 
+///
 /// Adds the marked lines of one file to a group; long lines are named, not shown.
 fn annotate_lines<'a>(
     group: Group<'a>,
@@ -312,6 +319,7 @@ fn annotate_lines<'a>(
     else {
         return group;
     };
+    // The window covers all complete lines from the first mark to the last.
     let text = file.text.as_str();
     let path = file.path.to_string_lossy().replace('\\', "/");
     let first = marks.iter().map(|mark| mark.0.start).min().unwrap_or(0);
@@ -329,6 +337,7 @@ fn annotate_lines<'a>(
         }
         return group;
     }
+    // Line numbers count from one; positions of marks are relative to the window.
     let line = text[..start].matches('\n').count() + 1;
     let mut snippet = Snippet::source(window).line_start(line).path(path);
     for &(span, label, primary) in marks {
@@ -344,17 +353,20 @@ fn annotate_lines<'a>(
     group.element(snippet)
 }
 
+/// Byte at which the line that contains `at` starts.
 fn line_start(text: &str, at: usize) -> usize {
     text[..floor_boundary(text, at)]
         .rfind('\n')
         .map_or(0, |found| found + 1)
 }
 
+/// Byte at which the line that contains `at` ends, without its line feed.
 fn line_end(text: &str, at: usize) -> usize {
     let at = ceil_boundary(text, at);
     text[at..].find('\n').map_or(text.len(), |found| at + found)
 }
 
+/// The last character boundary at or before `at`, so that slicing cannot panic.
 fn floor_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
@@ -363,6 +375,7 @@ fn floor_boundary(text: &str, at: usize) -> usize {
     at
 }
 
+/// The first character boundary at or after `at`.
 fn ceil_boundary(text: &str, at: usize) -> usize {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {

@@ -1,4 +1,6 @@
-//! One TOML text as a tree whose every value and key knows its place.
+//! One TOML text as a tree in which every value and key has its place.
+//!
+//! Text goes in, a [`TomlTable`] comes out. Syntax errors go to the log, and the readable part is returned.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -7,21 +9,23 @@ use toml::de::{DeTable, DeValue};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::unclosed::first_unclosed_bracket;
 
-/// Files larger than this are refused unread.
+/// Largest file in bytes that is read.
 pub const LARGEST_FILE: usize = 4 << 20;
-/// A text with more broken lines than this, and without a schema, is something else than a model file.
+/// A text with more broken lines than this, and without the key `schema`, is not a model file.
 const MOST_BROKEN_LINES: usize = 20;
-/// Names, paths and texts are cut to this length in messages.
+/// Longest quotation of names, paths and texts in messages, in characters.
 const LONGEST_QUOTE: usize = 60;
 
 /// A value with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct TomlNode {
+    /// Where the value stands.
     pub(crate) span: SourceSpan,
+    /// The value.
     pub(crate) value: TomlValue,
 }
 
-/// What a place of the file holds.
+/// A value of the file.
 #[derive(Clone, Debug)]
 pub(crate) enum TomlValue {
     /// A string; `inner` is the byte where its content starts, if it stands there without escapes.
@@ -30,7 +34,7 @@ pub(crate) enum TomlValue {
     Number { text: String, is_integer: bool },
     /// `true` or `false`.
     Boolean(bool),
-    /// A date or time, for which a model has no use.
+    /// A date or time, which no entry of a model accepts.
     Datetime,
     /// A list.
     Array(Vec<TomlNode>),
@@ -44,7 +48,9 @@ pub(crate) type TomlTable = Vec<(TomlKey, TomlNode)>;
 /// A key with its place.
 #[derive(Clone, Debug)]
 pub(crate) struct TomlKey {
+    /// The key without quotes.
     pub(crate) name: String,
+    /// Where the key stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -70,7 +76,7 @@ pub(crate) fn find_key<'a>(table: &'a TomlTable, name: &str) -> Option<&'a (Toml
     table.iter().find(|(key, _)| key.name == name)
 }
 
-/// A user's text, cut so that a message stays readable.
+/// A user's text, cut to [`LONGEST_QUOTE`] characters so that a message stays readable.
 pub(crate) fn quote(text: &str) -> String {
     if text.chars().count() <= LONGEST_QUOTE {
         return text.to_owned();
@@ -80,9 +86,9 @@ pub(crate) fn quote(text: &str) -> String {
     cut
 }
 
-/// Parses a file; syntax errors go to the log, and what could be understood comes back.
+/// Parses a file. Syntax errors go to the log, and the readable part is returned.
 pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
-    // The parser takes all that follows an open bracket for its inside; what stands before is read by itself.
+    // The parser treats all text after an open bracket as its content, so only the text before it is parsed.
     let open = first_unclosed_bracket(text)
         .filter(|_| text.len() <= LARGEST_FILE && !DeTable::parse_recoverable(text).1.is_empty());
     let Some(open) = open else {
@@ -96,6 +102,7 @@ pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> To
         start: at,
         end: (at + length).min(text.len()),
     };
+    // The bracket that is not closed is reported alone; errors behind it are consequences.
     let close = if open.bracket == '{' { '}' } else { ']' };
     let found = Diagnostic::error(
         span(open.at, 1),
@@ -109,6 +116,7 @@ pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> To
     table
 }
 
+/// Parses a text without open brackets; checks its size and reports syntax errors, one per line.
 fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     let whole = SourceSpan {
         file,
@@ -120,7 +128,7 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
         log.push(
             Diagnostic::error(whole, "this file is too large")
                 .label(format!("a model file has at most {LARGEST_FILE} bytes"))
-                .help("model files hold a mechanism; recordings belong into CSV files"),
+                .help("a model file describes a mechanism; recordings belong in CSV files"),
         );
         return TomlTable::new();
     }
@@ -128,10 +136,11 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     errors.sort_by_key(|error| error.span().map_or(0, |range| range.start));
     let is_model = root.get_ref().contains_key("schema");
     let mut last: Option<usize> = None;
+    // Faults are kept in a list first, and reported below.
     let mut found = Vec::new();
     for error in &errors {
         log.syntax_broken = true;
-        // What follows on the same line is mostly a consequence.
+        // A second error on the same line is usually a consequence of the first.
         let at = error.span().map_or(0, |range| range.start.min(text.len()));
         let before = last.replace(at);
         if before
@@ -144,19 +153,21 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
             start: range.start.min(text.len()),
             end: range.end.min(text.len()).max(range.start.min(text.len())),
         });
+        // Errors are collected first: with very many of them only one summary is reported.
         found.push(syntax_error(span, error.message()));
         if !is_model && found.len() > MOST_BROKEN_LINES {
             let first = found[0].span.unwrap_or(whole);
             log.push(
-                Diagnostic::error(first, "this is no model file")
+                Diagnostic::error(first, "this is not a model file")
                     .label("expected TOML, such as `schema = 1`")
                     .help(message!(
-                        "a recording goes where recordings are asked for ({})",
+                        "if it is a recording, pass it with {}",
                         Remedy::option(OptionName::Data)
                     )),
             );
             return TomlTable::new();
         }
+        // More errors help nobody; the log keeps fewer than this.
         if found.len() > 200 {
             break;
         }
@@ -167,12 +178,14 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
     table(root.into_inner(), text, file)
 }
 
+/// The diagnostic of a syntax error, with advice chosen by the parser's message.
 fn syntax_error(span: SourceSpan, message: &str) -> Diagnostic {
     if message.starts_with("string values must be quoted") {
         return Diagnostic::error(span, "this is not TOML: this value cannot be read")
             .label("expected one value, texts and expressions in quotes")
             .help("separate the entries of `{ }` and `[ ]` by commas");
     }
+    // Advice depends on words in the message of the parser.
     let help = if message.contains("recurs") {
         "nest arrays and tables at most 80 deep; a model needs four levels"
     } else if message.contains("duplicate key") {
@@ -190,6 +203,7 @@ fn syntax_error(span: SourceSpan, message: &str) -> Diagnostic {
         .help(help)
 }
 
+/// Converts a table of the parser; `text` is the complete file.
 fn table(table: DeTable<'_>, text: &str, file: usize) -> TomlTable {
     table
         .into_iter()
@@ -205,6 +219,7 @@ fn table(table: DeTable<'_>, text: &str, file: usize) -> TomlTable {
         .collect()
 }
 
+/// Converts a value of the parser with its place.
 fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode {
     let range = value.span();
     let span = SourceSpan {
@@ -213,7 +228,10 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
         end: range.end,
     };
     let value = match value.into_inner() {
+        // The place of the content is needed to mark parts of expressions.
         DeValue::String(string) => {
+            // The content starts behind one, three or four characters of quotes (and line feed), if it has no
+            // escapes.
             let inner = [1, 3, 4]
                 .into_iter()
                 .map(|skip| range.start + skip)
@@ -228,6 +246,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
         }
         DeValue::Integer(integer) => {
             let digits = integer.as_str();
+            // Hexadecimal, octal and binary integers are rewritten in base 10, as later readers expect.
             let text = if integer.radix() == 10 {
                 digits.to_owned()
             } else {

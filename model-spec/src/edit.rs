@@ -1,10 +1,10 @@
 //! Edits of a model file: an effect is added to its text, and everything else stays as it is, byte for byte.
 //!
-//! A text and a [`NewEffect`] go in, the new text comes out. The table goes behind the last effect, or to the end of a
-//! file without any; an inline list of effects gets one more entry.
+//! A text and a [`NewEffect`] go in, the new text comes out. The table is inserted behind the last effect, or at the
+//! end of a file without effects. An inline list of effects gets one more entry.
 //!
 //! Decision: an edit inserts text at one place, which is found from the spans of the parsed file. A parser that
-//! prints the whole document would change line ends and layout. The diagnosis and `add` use the same edit.
+//! prints the complete document would change line ends and layout. The diagnosis and `add` use the same edit.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -21,27 +21,27 @@ use crate::mechanism::{EffectPlace, Mechanism, ModelEffect};
 use crate::suggest;
 use crate::values::is_name;
 
-/// An effect that a model file shall have.
+/// An effect to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NewEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts.
+    /// Names of the places on which it acts.
     pub at: Vec<String>,
-    /// What is said of its parameters.
+    /// Names and nominal values of its parameters; all others have the defaults of the kind.
     pub parameters: Vec<NewParameter>,
     /// Values of its constants by their symbols, in SI units.
     pub constants: Vec<(String, f64)>,
-    /// A remark; its lines become comments above the effect.
+    /// A remark, which becomes comment lines above the effect.
     pub comment: Option<String>,
 }
 
-/// What is said of a parameter of a new effect.
+/// Name and nominal value of a parameter of a new effect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NewParameter {
     /// Its symbol in the kind.
     pub symbol: String,
-    /// Its name, if it is not to be called `symbol_place`; the name of a parameter that is there shares it.
+    /// Its name if that is not to be `symbol_place`. The name of an existing parameter shares that parameter.
     pub name: Option<String>,
     /// Nominal value in SI units.
     pub nominal: Option<f64>,
@@ -50,9 +50,9 @@ pub struct NewParameter {
 /// Why an effect cannot be added.
 #[derive(Clone, Debug)]
 pub enum EditFailure {
-    /// The effect is at fault: what is wrong, and what to do.
+    /// The effect is faulty: what is wrong, and what to do.
     Effect(String),
-    /// The model file is faulty, or would be with the effect.
+    /// The model file has errors, or would have them with the effect.
     Model(Box<LoadFailure>),
 }
 
@@ -72,16 +72,16 @@ impl std::error::Error for EditFailure {}
 pub struct EditedModel {
     /// Its text.
     pub text: String,
-    /// What it means now.
+    /// The model after the edit.
     pub loaded: LoadedModel,
-    /// The effect as it was added: with names for parameters whose usual names are taken.
+    /// The effect as it was added, with names for parameters whose default names are taken.
     pub effect: NewEffect,
 }
 
 /// Adds an effect to a model that is read from its text, as [`crate::load_with`] does, and reads the result.
 ///
-/// Fails if the model file is faulty before or after, if the kind or one of its symbols is unknown, and if the same
-/// effect acts at one of the places already.
+/// Fails if the model file has errors before or after the edit, if the kind or one of its symbols is unknown, or if
+/// the same effect already acts at one of the places.
 pub fn add_to_model(
     path_name: &str,
     text: &str,
@@ -90,6 +90,7 @@ pub fn add_to_model(
     files: &dyn FileSource,
 ) -> Result<EditedModel, EditFailure> {
     let model = |failure| EditFailure::Model(Box::new(failure));
+    // The file is read before and after the edit, so that the result is known to be valid.
     let before = load_with(path_name, text, libraries, files).map_err(model)?;
     let kind = kind_of(effect, &before.kinds)?;
     refuse_twin(effect, kind, &before.mechanism)?;
@@ -104,11 +105,11 @@ pub fn add_to_model(
     })
 }
 
-/// What messages call the text of an effect that is not in any file yet.
+/// Name in messages for the text of the new effect, which is in no file yet.
 const NEW_EFFECT: &str = "the effect to be added";
 
-/// A failure of the edited text with its places in what the user knows: the file as it is, and the effect as a text of
-/// its own. Lines of the edited text are those of no file.
+/// Moves the places of a failure from the edited text to texts that the user knows: the file as it is, and the effect
+/// as a text of its own.
 fn relocate_failure(
     mut failure: LoadFailure,
     old: &str,
@@ -116,12 +117,13 @@ fn relocate_failure(
     effect: &NewEffect,
 ) -> LoadFailure {
     let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
+    // Length of the common beginning of both texts; the edit lies behind it.
     let same = old
         .bytes()
         .zip(new.bytes())
         .take_while(|(a, b)| a == b)
         .count();
-    // The same text before the place of the edit is another effect's.
+    // The same text before the place of the edit belongs to another effect.
     let found = [effect_table(effect, line_end), inline_effect(effect)]
         .into_iter()
         .find_map(|entry| {
@@ -132,6 +134,7 @@ fn relocate_failure(
     let (Some((start, entry)), Some(file)) = (found, failure.sources.files.first_mut()) else {
         return failure;
     };
+    // The first source becomes the file of the user again; the effect becomes an additional source.
     old.clone_into(&mut file.text);
     let end = start + entry.len();
     let added = failure.sources.files.len();
@@ -140,6 +143,7 @@ fn relocate_failure(
         text: entry,
     });
     let longer = new.len().saturating_sub(old.len());
+    // Places inside of the effect move to the new source, those behind it back by the added length.
     let moved = |span: &mut SourceSpan| {
         if span.file != 0 {
             return;
@@ -160,10 +164,10 @@ fn relocate_failure(
     failure
 }
 
-/// Identified values that a model file shall have.
+/// Identified values to be written into a model file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AdoptedValues {
-    /// Where they come from.
+    /// Where the values come from; printed as comment lines.
     pub comment: String,
     /// Values of parameters by their names.
     pub parameters: Vec<(String, f64)>,
@@ -171,30 +175,31 @@ pub struct AdoptedValues {
     pub base: Vec<(String, f64)>,
 }
 
-/// Writes identified values into the text of a model file, in the place of earlier ones; everything else stays as it is.
+/// Writes identified values into the text of a model file and replaces earlier ones; everything else stays unchanged.
 ///
-/// Fails if the text is not TOML, or has its table `identified` in another form than this function writes.
+/// Fails if the text is not TOML, or if its table `identified` has another form than this function writes.
 ///
 /// ```
-/// use modelmill_spec::edit::{Adopted, adopt};
-/// let values = Adopted {
+/// use modelmill_spec::edit::{AdoptedValues, write_identified};
+/// let values = AdoptedValues {
 ///     comment: "from a fit".to_owned(),
 ///     base: vec![("m*l".to_owned(), 2.5)],
-///     ..Adopted::default()
+///     ..AdoptedValues::default()
 /// };
-/// let text = adopt("name = \"arm\" # mine\n", &values).unwrap();
+/// let text = write_identified("name = \"arm\" # mine\n", &values).unwrap();
 /// assert_eq!(text, "name = \"arm\" # mine\n\n[identified]\n# from a fit\nbase = [\n  \
 ///                   { expression = \"m*l\", value = 2.5 },\n]\n");
-/// assert_eq!(adopt(&text, &values).unwrap(), text);
+/// assert_eq!(write_identified(&text, &values).unwrap(), text);
 /// ```
 pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, String> {
     let mut log = DiagnosticLog::default();
     let table = document::parse_toml(text, 0, &mut log);
     if log.n_errors() > 0 {
-        return Err("this is not TOML; mend the file first".to_owned());
+        return Err("this is not TOML; correct the file first".to_owned());
     }
     let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mut kept = text.to_owned();
+    // An earlier table is removed from its header to its last line of values.
     if let Some((key, _)) = find_key(&table, "identified") {
         let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         if text[start..].lines().next().map(str::trim) != Some("[identified]") {
@@ -211,7 +216,7 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
             }
             at += line.len();
         }
-        // What stands above the next table belongs to it.
+        // Comments and blank lines above the next table belong to that table.
         let own = &text[start..end];
         let last = own
             .trim_end()
@@ -222,6 +227,7 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
             .map_or(own.len(), |line| last + line + 1);
         kept = format!("{}{}", text[..start].trim_end(), line_end);
         let rest = &text[start + own_end..];
+        // The new table takes the place of the old one if other tables follow.
         if !rest.trim().is_empty() {
             let block = identified_table(values, line_end);
             return Ok(format!(
@@ -230,6 +236,7 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
             ));
         }
     }
+    // Otherwise it is appended, separated by an empty line.
     if !kept.is_empty() {
         if !kept.ends_with('\n') {
             kept.push_str(line_end);
@@ -239,9 +246,10 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
     Ok(kept + &identified_table(values, line_end))
 }
 
-/// The table of identified values.
+/// The text of the table of identified values.
 fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     let mut lines = vec!["[identified]".to_owned()];
+    // Control characters would end a comment.
     let comment = values.comment.lines();
     lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
     if !values.parameters.is_empty() {
@@ -264,9 +272,10 @@ fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     lines.join(line_end) + line_end
 }
 
-/// Adds an effect to the text of a model file; whether it means anything there is not looked at.
+/// Adds an effect to the text of a model file. Whether the effect fits the model is not checked.
 ///
-/// Fails if the text is not TOML, its `effect` is no list of tables, or the effect cannot be written.
+/// Fails if the text is not TOML, if its `effect` is not a list of tables, or if the effect has names or values that
+/// cannot be written.
 ///
 /// ```
 /// use modelmill_spec::edit::{NewEffect, NewParameter, add_effect};
@@ -287,7 +296,7 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
     if log.n_errors() > 0 {
         let says = log.finish().into_iter().next().map(|found| found.message);
         return Err(EditFailure::Effect(format!(
-            "{}; mend the file first",
+            "{}; correct the file first",
             says.unwrap_or_else(|| "this is not TOML".to_owned())
         )));
     }
@@ -297,11 +306,11 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
         Some((key, node)) => {
             let TomlValue::Array(entries) = &node.value else {
                 return Err(EditFailure::Effect(
-                    "`effect` of this file is no list of tables; write effects as `[[effect]]`"
+                    "`effect` of this file is not a list of tables; write effects as `[[effect]]`"
                         .to_owned(),
                 ));
             };
-            // Behind the key of an inline list stands `=`, behind that of a header `]]`.
+            // The key of an inline list is followed by `=`, that of a header by `]]`.
             let is_inline = text[key.span.end..].trim_start().starts_with('=');
             if is_inline {
                 Ok(extend_inline(text, node, entries, effect, line_end))
@@ -312,7 +321,7 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
     }
 }
 
-/// The last byte that belongs to a value or anything in it.
+/// End of a value, including everything in it, in bytes.
 fn end_of(node: &TomlNode) -> usize {
     let inner = match &node.value {
         TomlValue::Array(entries) => entries.iter().map(end_of).max(),
@@ -325,9 +334,10 @@ fn end_of(node: &TomlNode) -> usize {
     inner.unwrap_or(0).max(node.span.end)
 }
 
-/// Puts a table behind the last effect.
+/// Inserts a table behind the last effect.
 fn insert_behind(text: &str, list: &TomlNode, effect: &NewEffect, line_end: &str) -> String {
     let end = end_of(list).min(text.len());
+    // Without a line end behind the last effect the file ends there.
     let Some(rest) = text[end..].find('\n') else {
         return append(text, effect, line_end);
     };
@@ -336,7 +346,7 @@ fn insert_behind(text: &str, list: &TomlNode, effect: &NewEffect, line_end: &str
     format!("{}{line_end}{block}{}", &text[..at], &text[at..])
 }
 
-/// Puts a table at the end of a file.
+/// Appends a table to the file, separated by an empty line.
 fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
     let mut new = text.to_owned();
     if !text.is_empty() {
@@ -349,7 +359,7 @@ fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
     new
 }
 
-/// Puts an entry behind the last one of an inline list.
+/// Inserts an entry behind the last one of an inline list.
 fn extend_inline(
     text: &str,
     list: &TomlNode,
@@ -359,11 +369,11 @@ fn extend_inline(
 ) -> String {
     let entry = inline_effect(effect);
     let Some(last) = entries.last() else {
-        let at = list.span.start + 1; // Behind the bracket.
+        let at = list.span.start + 1; // Position behind the bracket.
         return format!("{}{entry}{}", &text[..at], &text[at..]);
     };
     let end = last.span.end;
-    // A list with an entry per line goes on like that.
+    // If entries stand on lines of their own, the new one gets its own line with the same indentation.
     let line = text[..last.span.start].rfind('\n').map_or(0, |at| at + 1);
     let indent = &text[line..last.span.start];
     let lead = if line > list.span.start && indent.trim().is_empty() {
@@ -371,11 +381,12 @@ fn extend_inline(
     } else {
         " ".to_owned()
     };
+    // A comma behind the last entry is kept; otherwise one is inserted.
     let (comma, behind) = match comma_behind(text, end) {
         Some(comma) => (None, comma + 1),
         None => (Some(end), end),
     };
-    // A remark on the same line belongs to the last entry.
+    // A comment on the same line belongs to the last entry, so the new one goes to the next line.
     let rest_of_line = text[behind..]
         .split_inclusive('\n')
         .next()
@@ -388,6 +399,7 @@ fn extend_inline(
     } else {
         (behind, lead)
     };
+    // The new entry ends with a comma exactly if the last one did.
     let (comma, close) = match comma {
         Some(_) => (",", ""),
         None => ("", ","),
@@ -400,7 +412,7 @@ fn extend_inline(
     )
 }
 
-/// The comma behind an entry of a list, past blanks and remarks.
+/// Position of the comma behind an entry of a list, after blanks and comments; `None` if there is none.
 fn comma_behind(text: &str, end: usize) -> Option<usize> {
     let mut at = end;
     loop {
@@ -415,7 +427,7 @@ fn comma_behind(text: &str, end: usize) -> Option<usize> {
     }
 }
 
-/// The effect as a table with a header.
+/// The effect as a table with a header, preceded by its remark as comment lines.
 fn effect_table(effect: &NewEffect, line_end: &str) -> String {
     let mut lines: Vec<String> = remarks(effect).map(|line| format!("# {line}")).collect();
     lines.push("[[effect]]".to_owned());
@@ -424,7 +436,7 @@ fn effect_table(effect: &NewEffect, line_end: &str) -> String {
     lines.join(line_end)
 }
 
-/// The effect as an inline table.
+/// The effect as an inline table; its remark becomes the field `note`.
 fn inline_effect(effect: &NewEffect) -> String {
     let mut fields = fields(effect);
     let remark: Vec<String> = remarks(effect).collect();
@@ -435,7 +447,7 @@ fn inline_effect(effect: &NewEffect) -> String {
     format!("{{ {} }}", fields.join(", "))
 }
 
-/// The lines of the remark, without what a line cannot hold.
+/// The lines of the remark without control characters.
 fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
     let lines = effect.comment.iter().flat_map(|comment| comment.lines());
     lines.map(|line| {
@@ -446,12 +458,14 @@ fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
     })
 }
 
+/// The fields of the effect as `key = value`; parameters and constants only if there are any.
 fn fields(effect: &NewEffect) -> Vec<String> {
     let places: Vec<String> = effect.at.iter().map(|name| format!("\"{name}\"")).collect();
     let mut fields = vec![
         format!("kind = \"{}\"", effect.kind),
         format!("at = [{}]", places.join(", ")),
     ];
+    // Parameters without a name and a value keep the defaults of the kind.
     let said = effect
         .parameters
         .iter()
@@ -476,7 +490,7 @@ fn fields(effect: &NewEffect) -> Vec<String> {
     fields
 }
 
-/// Refuses names and numbers that a model file cannot hold.
+/// Refuses names that are not identifiers, and values that are not finite.
 fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     let parameters = effect.parameters.iter();
     let names = std::iter::once(&effect.kind)
@@ -510,7 +524,7 @@ fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     Ok(())
 }
 
-/// The kind of a new effect, if it has all symbols that the effect names.
+/// The kind of a new effect; fails if it is unknown or lacks a symbol that the effect uses.
 fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a EffectKind, EditFailure> {
     let unknown = |what: &str, name: &str, known: Vec<&str>, of: &str| {
         let advice = suggest::advice(name, &format!("{what}s"), known.iter().copied());
@@ -540,12 +554,13 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
     Ok(kind)
 }
 
-/// Refuses an effect that acts at one of its places already, with the same constants.
+/// Refuses an effect that already acts at one of its places with the same constants.
 fn refuse_twin(
     effect: &NewEffect,
     kind: &EffectKind,
     mechanism: &Mechanism,
 ) -> Result<(), EditFailure> {
+    // The value of the new effect, else the default of the kind.
     let wanted = |symbol: &str| {
         let given = effect.constants.iter().find(|(name, _)| name == symbol);
         given.map(|(_, value)| *value).or_else(|| {
@@ -558,12 +573,13 @@ fn refuse_twin(
             .constants
             .iter()
             .all(|one| known.constant(&one.symbol, mechanism) == wanted(&one.symbol));
-        // What couples two places may couple each with a third.
+        // Effects that couple two places are equal only if they couple the same ones.
         let places = known.places.iter().chain(&known.other);
         let names = places.map(|p| mechanism.place_name(*p));
         if kind.places == Some(2) && !names.clone().all(|n| effect.at.iter().any(|at| at == n)) {
             continue;
         }
+        // Tilt and delay are properties of the complete mechanism, whatever their constants are.
         let whole = matches!(known.places[..], [EffectPlace::Base | EffectPlace::Force]);
         let place = names
             .into_iter()
@@ -578,7 +594,7 @@ fn refuse_twin(
     Ok(())
 }
 
-/// The effect with names for those parameters whose usual names mean something else already.
+/// The effect with new names for parameters whose default names are taken by other quantities.
 fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> NewEffect {
     let parameters = mechanism.parameters.iter().map(|one| one.name.as_str());
     let constants = mechanism.constants.iter().map(|one| one.name.as_str());
@@ -596,7 +612,7 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
         {
             continue;
         }
-        // More names are not taken than there are names.
+        // One of these numbers is free, because there are more of them than names.
         let free = (2..taken.len() + 3)
             .map(|n| format!("{usual}_{n}"))
             .find(|name| !taken.contains(name.as_str()));
@@ -613,7 +629,7 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
 }
 
 impl Mechanism {
-    /// The name of a place, as the model file calls it.
+    /// The name of a place in the model file.
     pub fn place_name(&self, place: EffectPlace) -> &str {
         match place {
             EffectPlace::Drive(idx) => &self.drives[idx.0].name,
@@ -627,7 +643,8 @@ impl Mechanism {
 }
 
 impl ModelEffect {
-    /// The value of a constant of its kind, in SI units; `None` if the kind has none of this symbol or it is left away.
+    /// The value of a constant of its kind, in SI units; `None` if the kind has no such constant or the value is
+    /// omitted.
     pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
         let found = self.constants.iter().find(|(name, _)| name == symbol);
         let value =

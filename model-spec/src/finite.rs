@@ -1,8 +1,8 @@
-//! Expressions that have no value at the constants of the file: divisions by zero, roots of negative numbers, numbers
-//! beyond what a float can hold.
+//! Finds expressions without a finite value at the constants of the file: divisions by zero, roots of negative
+//! numbers, and numbers beyond the range of a float.
 //!
-//! A parsed expression goes in, the innermost piece of it at fault comes out; what depends on the motion or on dynamic
-//! parameters has no value of its own and is looked into only.
+//! A parsed expression goes in, the innermost faulty part of it comes out. Parts that depend on the motion or on
+//! dynamic parameters have no value, but the expressions inside of them are checked.
 
 use num_traits::ToPrimitive;
 
@@ -10,28 +10,31 @@ use crate::diagnostic::{Diagnostic, SourceSpan};
 use crate::exact::ExactFunction;
 use crate::formula::{FormulaAst, FormulaAstKind};
 
-/// A piece of an expression without a value.
+/// A part of an expression without a finite value.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ValueFault<'a> {
-    /// The divisor, the operand of the root, or the whole that is too large.
+    /// The divisor, the operand of the root, or the expression that is too large.
     pub(crate) piece: &'a FormulaAst,
     /// Its value.
     pub(crate) value: f64,
+    /// Why there is no finite value.
     pub(crate) cause: ValueFaultCause,
 }
 
-/// Why there is no value.
+/// Why there is no finite value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ValueFaultCause {
-    /// The piece is zero, and something is divided by it.
+    /// The part is zero and a divisor.
     Divides,
-    /// The piece is negative, and its root is taken.
+    /// The part is negative and the operand of a square root.
     Root,
-    /// The piece is too large.
+    /// The part is too large.
     TooLarge,
 }
 
-/// The value of an expression; `None` where it depends on names whose value is not known.
+/// The value of an expression; `None` if it depends on names without a known value.
+///
+/// `known` gives the values of names. Fails with the innermost part that has no finite value.
 pub(crate) fn value<'a>(
     ast: &'a FormulaAst,
     known: &dyn Fn(&str) -> Option<f64>,
@@ -50,6 +53,7 @@ pub(crate) fn value<'a>(
         FormulaAstKind::Sum(terms) => fold(terms, known, 0.0, |a, b| a + b)?,
         FormulaAstKind::Product(factors) => fold(factors, known, 1.0, |a, b| a * b)?,
         FormulaAstKind::Quotient(above, below) => {
+            // Both sides are evaluated, so that a fault in either is found.
             let (above, divisor) = (value(above, known)?, value(below, known)?);
             if divisor == Some(0.0) {
                 return fault(below, 0.0, ValueFaultCause::Divides);
@@ -66,6 +70,7 @@ pub(crate) fn value<'a>(
         }
         FormulaAstKind::Apply(function, inner) => {
             let x = value(inner, known)?;
+            // A root of a negative number has no real value.
             if let (ExactFunction::Sqrt, Some(x)) = (function, x)
                 && x < 0.0
             {
@@ -83,13 +88,14 @@ pub(crate) fn value<'a>(
             })
         }
     };
+    // Every part is checked here, so the innermost one is reported.
     match found {
         Some(x) if !x.is_finite() => fault(ast, x, ValueFaultCause::TooLarge),
         found => Ok(found),
     }
 }
 
-/// All operands are looked into, also behind one that is not known.
+/// Combines the values of operands. All of them are evaluated, also after one that is unknown.
 fn fold<'a>(
     operands: &'a [FormulaAst],
     known: &dyn Fn(&str) -> Option<f64>,
@@ -105,12 +111,13 @@ fn fold<'a>(
 }
 
 impl ValueFault<'_> {
-    /// The finding; `declared` is where the name at fault is, if the piece is a name alone.
+    /// The diagnostic; `declared` is the place of the faulty name, if the part is a name only.
     pub(crate) fn report(&self, declared: Option<SourceSpan>) -> Diagnostic {
+        // What was found, and what to do about it.
         let (message, help) = match self.cause {
             ValueFaultCause::Divides => (
                 "this divides by zero",
-                "change the constants in it, or leave away what is divided",
+                "change the constants in it, or omit the quotient",
             ),
             ValueFaultCause::Root => (
                 "this is the root of a negative number",
@@ -139,7 +146,7 @@ impl ValueFault<'_> {
     }
 }
 
-/// Whether an expression mentions a name.
+/// Whether an expression contains a name.
 pub(crate) fn mentions(ast: &FormulaAst, name: &str) -> bool {
     match &ast.kind {
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => false,

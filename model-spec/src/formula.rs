@@ -1,4 +1,6 @@
-//! Expressions of a model file before their names are looked up: trees whose every node knows its place.
+//! Expressions of a model file before their names are resolved: trees in which every node has its place.
+//!
+//! Text of the file goes in; the scope turns the tree into an exact expression.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -13,7 +15,7 @@ use crate::record::{SchemaValue, wrong_type};
 
 /// Longest text of an expression, in bytes.
 pub(crate) const LONGEST_FORMULA: usize = 4000;
-/// The functions of the language.
+/// The functions of the expression language, by their names.
 pub(crate) const FUNCTIONS: [(&str, ExactFunction); 7] = [
     ("sin", ExactFunction::Sin),
     ("cos", ExactFunction::Cos),
@@ -24,31 +26,44 @@ pub(crate) const FUNCTIONS: [(&str, ExactFunction); 7] = [
     ("exp", ExactFunction::Exp),
 ];
 
-/// A parsed expression whose names are not yet looked up.
+/// A parsed expression whose names are not resolved yet.
 #[derive(Clone, Debug)]
 pub(crate) struct FormulaAst {
+    /// Where the node stands.
     pub(crate) span: SourceSpan,
+    /// Its shape with its operands.
     pub(crate) kind: FormulaAstKind,
 }
 
-/// Shape of a node; see [`crate::Exact`].
+/// Shape of a node; see [`crate::ExactExpression`].
 #[derive(Clone, Debug)]
 pub(crate) enum FormulaAstKind {
+    /// A number, exact.
     Rational(BigRational),
+    /// The number pi.
     Pi,
+    /// A name that is not resolved yet.
     Name(String),
+    /// Sum of at least two terms.
     Sum(Vec<FormulaAst>),
+    /// Product of factors.
     Product(Vec<FormulaAst>),
+    /// First operand over the second.
     Quotient(Box<FormulaAst>, Box<FormulaAst>),
+    /// The operand with the opposite sign.
     Negative(Box<FormulaAst>),
+    /// Integer power.
     Power(Box<FormulaAst>, i32),
+    /// A function of its operand.
     Apply(ExactFunction, Box<FormulaAst>),
 }
 
 /// An expression of the file with its text.
 #[derive(Clone, Debug)]
 pub(crate) struct SourceFormula {
+    /// The text as the author wrote it.
     pub(crate) text: String,
+    /// The parsed tree.
     pub(crate) ast: FormulaAst,
 }
 
@@ -67,7 +82,7 @@ impl SchemaValue for SourceFormula {
                     );
                     return None;
                 }
-                // The number as written may hold `_`; only an untouched one can be marked digit by digit.
+                // A number in the file may contain `_`. Only without them the parts of the number have known places.
                 let same = text.len() == node.span.end - node.span.start;
                 (text, same.then_some(node.span.start))
             }

@@ -1,4 +1,4 @@
-//! How a coordinate moves what stands behind its joint, and what follows from that: units, and what a drive carries.
+//! The kind of motion of a coordinate, and its consequences: units, and the load of a drive.
 
 use crate::kinds::PlaceLoad;
 use crate::mechanism::{DriveKind, JointCoordinate};
@@ -11,15 +11,15 @@ pub enum CoordinateMotion {
     Revolute,
     /// Length in m.
     Prismatic,
-    /// Component of the vector part of a free body's unit quaternion. Its rate is the body's angular velocity about the same
-    /// axis, in rad/s, and not the component's own derivative.
+    /// Component of the vector part of a free body's unit quaternion. Its rate is the body's angular velocity about
+    /// the same axis, in rad/s, and not the derivative of the component.
     Quaternion,
-    /// The scalar part, which has no rate of its own.
+    /// The scalar part of such a quaternion, which has no rate of its own.
     QuaternionScalar,
 }
 
 impl CoordinateMotion {
-    /// Whether the coordinate is an angle in rad; else it is a length in m.
+    /// Whether the coordinate is an angle in rad.
     pub fn is_angle(self) -> bool {
         match self {
             Self::Revolute => true,
@@ -37,12 +37,12 @@ impl CoordinateMotion {
         matches!(self, Self::Quaternion | Self::QuaternionScalar)
     }
 
-    /// Whether a rate belongs to the coordinate; else its place among the rates and accelerations is not read.
+    /// Whether the coordinate has a rate. If not, its entries in vectors of rates and accelerations are ignored.
     pub fn has_rate(self) -> bool {
         self != Self::QuaternionScalar
     }
 
-    /// The field's word for the joint.
+    /// The common name of such a joint.
     pub fn name(self) -> &'static str {
         match self {
             Self::Revolute => "revolute",
@@ -61,7 +61,9 @@ impl CoordinateMotion {
         }
     }
 
-    /// What acts on the coordinate.
+    /// Whether a force or a torque acts on the coordinate.
+    ///
+    /// The vector part of a quaternion carries a torque, dual to its angular velocity.
     pub fn place_load(self) -> PlaceLoad {
         if self.is_length() {
             PlaceLoad::Force
@@ -81,7 +83,7 @@ impl CoordinateMotion {
 }
 
 impl DriveKind {
-    /// What a drive of this kind carries, among the coordinates of its mechanism.
+    /// Whether a drive of this kind has a force or a torque; `coordinates` are those of its mechanism.
     pub fn place_load(self, coordinates: &[JointCoordinate]) -> PlaceLoad {
         match self {
             Self::Joint(i) => coordinates

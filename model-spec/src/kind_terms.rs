@@ -1,4 +1,6 @@
-//! What a kind of effect adds at a place: its expression with units settled, split into one factor per parameter.
+//! What a kind of effect adds at a place: its expression, checked for units and split into one factor per parameter.
+//!
+//! A kind and the load of a place go in; the factors that multiply its parameters come out.
 
 use std::cell::Cell;
 
@@ -10,7 +12,9 @@ use crate::scope::{FormulaRequirement, FormulaScope, SymbolMeaning, SymbolSort, 
 use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::UnitByPlace;
 
-/// Symbols of a kind that have no unit where the place carries this.
+/// Parameters and constants of a kind that have no unit for this load of a place.
+///
+/// Such a kind cannot act at a place with this load.
 pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) -> Vec<&str> {
     let parameters = entry
         .parameters
@@ -24,6 +28,7 @@ pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) 
         .map(|(key, constant)| (key, &constant.unit));
     parameters
         .chain(constants)
+        // A missing unit was reported by the reader, so it does not count here.
         .filter(|(_, unit)| {
             unit.as_ref()
                 .is_some_and(|unit| carries.unit(unit).is_none())
@@ -32,22 +37,26 @@ pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) 
         .collect()
 }
 
-/// The unit of a kind's parameter at a place that carries this.
+/// The unit of a kind's parameter or constant for this load of a place.
 pub(crate) fn unit_at(unit: Option<&UnitByPlace>, carries: PlaceLoad) -> Option<&ModelUnit> {
     carries.unit(unit?)
 }
 
-/// What multiplies each parameter of a kind at a place, in the order of the kind's parameters.
+/// The factor of each parameter of a kind for this load of a place, in the order of the kind's parameters.
+///
+/// `constants` gives the expressions that replace the kind's constants. Faults go to the log and give `None`.
 pub(crate) fn factors(
     entry: &EffectKindEntry,
     carries: PlaceLoad,
     constants: &[(String, ExactExpression)],
     log: &mut DiagnosticLog,
 ) -> Option<Vec<ExactExpression>> {
+    // The scope has the symbols of the kind only; names of the model are not known in it.
     let before = log.n_errors();
     let expression = entry.expression.as_ref()?;
     let parameters = &entry.parameters.as_ref()?.entries;
     let scope = scope(entry, carries, constants, log);
+    // The name of the expression in messages states for which load it was checked.
     let what = format!(
         "where the place carries a {}, what this kind adds",
         if carries == PlaceLoad::Mass {
@@ -56,6 +65,7 @@ pub(crate) fn factors(
             carries.name()
         }
     );
+    // The dimension of the expression must be that of the load.
     let exact = scope.resolve(
         expression,
         FormulaRequirement {
@@ -69,6 +79,7 @@ pub(crate) fn factors(
         },
         log,
     )?;
+    // Resolving marked the names that the expression uses.
     for (key, _) in parameters {
         if scope
             .get(&key.name)
@@ -87,19 +98,22 @@ pub(crate) fn factors(
     if log.n_errors() > before {
         return None;
     }
+    // Factors are valid only if the expression is a homogeneous linear function of the parameters.
     let mut factors = vec![Vec::new(); parameters.len()];
     if !split_into_factors(&exact, &ExactExpression::unity(), &mut factors) {
+        // A term without a parameter, or with two of them, is not linear.
         log.push(
             Diagnostic::error(
                 expression.ast.span,
                 "this expression is not linear in the kind's parameters",
             )
             .label("expected a sum of terms, each with exactly one parameter as a factor")
-            .help("declare what bends the curve as a constant of the kind; a term without a parameter is known and needs a parameter with a nominal value"),
+            .help("declare nonlinear quantities as constants of the kind; multiply a known term by a parameter with a nominal value"),
         );
         return None;
     }
     Some(
+        // Terms with the same parameter are added.
         factors
             .into_iter()
             .map(|mut terms| match terms.len() {
@@ -111,6 +125,9 @@ pub(crate) fn factors(
     )
 }
 
+/// The names that the expression of a kind may use: its parameters, its constants, and the motion of its places.
+///
+/// `constants` gives the expressions of the kind's constants; the units of all symbols are those for this load.
 fn scope(
     entry: &EffectKindEntry,
     carries: PlaceLoad,
@@ -122,6 +139,7 @@ fn scope(
         .parameters
         .iter()
         .flat_map(|parameters| &parameters.entries);
+    // Parameters by their index in the kind, which the split uses.
     for (i, (key, parameter)) in parameters.enumerate() {
         let unit = unit_at(parameter.unit.as_ref(), carries);
         let symbol = ModelSymbol::Parameter(ParameterIdx(i));
@@ -132,6 +150,7 @@ fn scope(
             log,
         );
     }
+    // Constants with the expressions of the effect.
     for (key, constant) in entry
         .constants
         .iter()
@@ -140,6 +159,7 @@ fn scope(
         let unit = unit_at(constant.unit.as_ref(), carries);
         let exact = constants
             .iter()
+            // A constant without an expression counts as one; the caller gives all constants of the kind.
             .find(|(name, _)| *name == key.name)
             .map_or_else(ExactExpression::unity, |(_, exact)| exact.clone());
         scope.declare(
@@ -156,11 +176,14 @@ fn scope(
             log,
         );
     }
+    // Places with a mass, the base, and the like have no motion that an expression could use.
     let Some(own) = dimensions(carries) else {
         return scope;
     };
+    // The other place has the same dimensions unless `other` states how it moves.
     let other = entry.other.map_or(carries, OtherMotion::place_load);
     let other = dimensions(other).unwrap_or(own);
+    // Coordinate, rate, acceleration and load of the place, then those of the other place.
     for quantity in PlaceQuantity::ALL {
         let dimension = match quantity {
             PlaceQuantity::Coordinate => own[0],
@@ -181,7 +204,7 @@ fn scope(
     scope
 }
 
-/// Dimensions of position, rate, acceleration and load of a place, where it has them.
+/// Dimensions of coordinate, rate, acceleration and load of a place; `None` if it has no motion.
 fn dimensions(carries: PlaceLoad) -> Option<[UnitDimension; 4]> {
     match carries {
         PlaceLoad::Mass | PlaceLoad::Elsewhere => None,
@@ -200,17 +223,21 @@ fn dimensions(carries: PlaceLoad) -> Option<[UnitDimension; 4]> {
     }
 }
 
+/// Whether a symbol is a parameter of the kind.
 fn is_parameter(symbol: ModelSymbol) -> bool {
     matches!(symbol, ModelSymbol::Parameter(_))
 }
 
-/// Splits `factor * exact` into terms per parameter; false if it is not linear and homogeneous in them.
+/// Splits `factor * exact` into terms per parameter; false if `exact` is not linear and homogeneous in them.
+///
+/// The factor of each occurrence is appended to the list of its parameter.
 fn split_into_factors(
     exact: &ExactExpression,
     factor: &ExactExpression,
     factors: &mut [Vec<ExactExpression>],
 ) -> bool {
     match exact {
+        // A parameter by itself: the accumulated factor belongs to it.
         ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => {
             match factors.get_mut(*i) {
                 Some(terms) => {
@@ -220,6 +247,7 @@ fn split_into_factors(
                 None => false,
             }
         }
+        // Sums and signs are passed on to their operands.
         ExactExpression::Sum(terms) => terms
             .iter()
             .all(|term| split_into_factors(term, factor, factors)),
@@ -229,6 +257,7 @@ fn split_into_factors(
             factors,
         ),
         ExactExpression::Product(members) => {
+            // Exactly one member may contain parameters; all others join the factor.
             let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) = members
                 .iter()
                 .partition(|member| member.mentions(&is_parameter));
@@ -246,6 +275,7 @@ fn split_into_factors(
             };
             split_into_factors(linear, &product, factors)
         }
+        // Divisors join the factor and must be free of parameters.
         ExactExpression::Quotient(above, below) => {
             !below.mentions(&is_parameter)
                 && split_into_factors(

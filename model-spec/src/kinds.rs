@@ -1,4 +1,4 @@
-//! Kinds of effects: data that say what an effect adds to the force of its place.
+//! Kinds of effects: data that state what an effect adds to the force of its place.
 //!
 //! A library file and the model's own `[[effect_kind]]` tables go in; checked kinds come out, and for each effect
 //! the factor that multiplies each of its parameters.
@@ -18,10 +18,10 @@ use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::{self, SpannedText, UnitByPlace};
 use crate::words::words;
 
-/// The library of kinds as the program brings it along.
+/// The library of kinds that is part of the program, as TOML.
 pub const LIBRARY: &str = include_str!("../library/effects.toml");
 
-/// What a place carries, which settles the units there.
+/// The load of a place, which determines the units there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PlaceLoad {
     /// A force, on a prismatic joint or a linear drive.
@@ -35,7 +35,7 @@ pub enum PlaceLoad {
 }
 
 impl PlaceLoad {
-    /// Whatever a place may carry.
+    /// All loads.
     pub const ALL: [Self; 4] = [Self::Force, Self::Torque, Self::Mass, Self::Elsewhere];
 
     /// The dimension of what the place carries.
@@ -48,7 +48,7 @@ impl PlaceLoad {
         }
     }
 
-    /// The key of its units.
+    /// The key of its units in a model file.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Force => "force",
@@ -58,7 +58,7 @@ impl PlaceLoad {
         }
     }
 
-    /// The unit for it among several.
+    /// The unit for this load among units by place, if there is one.
     pub(crate) fn unit(self, units: &UnitByPlace) -> Option<&ModelUnit> {
         match self {
             Self::Force => units.force.as_ref(),
@@ -77,7 +77,7 @@ words! {
     "positive" => Positive,
     /// Not above zero.
     "negative" => Negative,
-    /// Either.
+    /// Either sign is possible.
     "any" => Any,
 }
 
@@ -93,14 +93,14 @@ words! {
     "point" => Point,
     /// A part.
     "part" => Part,
-    /// The base as a whole, named `base`.
+    /// The complete base, named `base`.
     "base" => Base,
-    /// The measured forces as a whole, named `force`.
+    /// All measured forces, named `force`.
     "force" => Force,
 }
 
 impl ActsOn {
-    /// What it is, for people.
+    /// The place with its article, for messages.
     pub fn description(self) -> &'static str {
         match self {
             Self::Drive => "a drive",
@@ -114,17 +114,17 @@ impl ActsOn {
 }
 
 words! {
-    /// How the second place of a kind moves that acts at the first alone.
+    /// How the second place of a kind moves, if the kind acts at the first place only.
     #[derive(PartialOrd, Ord, Hash)]
     pub OtherMotion as "OtherMotionName": "how a place moves",
-    /// It turns.
+    /// It is revolute.
     "angle" => Angle,
-    /// It slides, or is the length of a linear drive.
+    /// It is prismatic, or the length of a linear drive.
     "length" => Length,
 }
 
 impl OtherMotion {
-    /// What a place carries that moves so.
+    /// The load of a place that moves in this way.
     pub fn place_load(self) -> PlaceLoad {
         match self {
             Self::Angle => PlaceLoad::Torque,
@@ -132,44 +132,44 @@ impl OtherMotion {
         }
     }
 
-    /// How it moves, for people.
+    /// How it moves, for messages.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Angle => "turns",
-            Self::Length => "slides",
+            Self::Angle => "is revolute",
+            Self::Length => "is prismatic",
         }
     }
 }
 
 words! {
-    /// What the values of a search are relative to.
+    /// The scale of a search range.
     #[derive(PartialOrd, Ord, Hash)]
     pub Scale as "ScaleName": "what a range is relative to",
     /// The largest rate of the place.
     "rate" => Rate,
     /// The travel of the place's coordinate: the largest value less the smallest.
     "travel" => Travel,
-    /// Nothing: they are in SI units.
+    /// No scale: values are in SI units.
     "one" => One,
 }
 
-/// How a constant's value is found where it is not known.
+/// How the value of an unknown constant is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ConstantSearch {
     /// The expression is affine in it, so that its product with the parameter is a parameter itself.
     Linear,
     /// Values from `from` to `to`, times the scale, are tried.
     Range {
-        /// The least.
+        /// The least value.
         from: f64,
-        /// The largest.
+        /// The largest value.
         to: f64,
-        /// What both are multiples of.
+        /// The scale that multiplies both.
         of: Scale,
     },
 }
 
-/// A kind of effect, for people and programs that choose among them.
+/// A kind of effect, as messages, pages and searches use it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectKind {
     /// Name of the kind.
@@ -178,25 +178,25 @@ pub struct EffectKind {
     pub says: String,
     /// Where it may act.
     pub on: Vec<ActsOn>,
-    /// What it adds, as text; empty where `mechanics` says it.
+    /// What it adds, as text; empty if `mechanics` describes it.
     pub expression: String,
-    /// What it does, if that is no expression.
+    /// What it does, if that is not an expression.
     pub mechanics: Option<Mechanics>,
-    /// Its parameters.
+    /// Its parameters, which identification estimates.
     pub parameters: Vec<KindParameter>,
-    /// Quantities that give its shape.
+    /// Known quantities that determine its shape.
     pub constants: Vec<KindConstant>,
-    /// How many places it must have; any number if `None`.
+    /// How many places it must have; `None` for any number.
     pub places: Option<usize>,
-    /// How the second place moves, where it acts at the first alone.
+    /// How the second place moves, if the kind acts at the first place only.
     pub other: Option<OtherMotion>,
-    /// One paragraph: what it is, where it comes from, how the error looks that it leaves. May be empty.
+    /// One paragraph: what it is, where it comes from, and how the error looks if a model lacks it. May be empty.
     pub explains: String,
-    /// What it is easily taken for, and which experiment tells them apart. May be empty.
+    /// Effects it can be confused with, and the experiment that distinguishes them. May be empty.
     pub doubles: String,
-    /// A simpler kind that it holds as a special case.
+    /// A simpler kind that is a special case of this one.
     pub refines: Option<String>,
-    /// True if the model file or a library of its own defines it, false if the program's library does.
+    /// True if the model file or a library of the user defines it, false for the program's library.
     pub is_own: bool,
 }
 
@@ -218,11 +218,11 @@ pub struct KindParameter {
 pub struct KindConstant {
     /// Its symbol in the expression.
     pub symbol: String,
-    /// Value as text where the effect gives none; `None` if the effect must give one.
+    /// Default value as text; `None` if the effect must give one.
     pub value: Option<String>,
     /// Units by what the place carries.
     pub units: Vec<(PlaceLoad, String)>,
-    /// How it is found where it is not known; `None` if it must be known.
+    /// How it is found if it is unknown; `None` if it must be known.
     pub search: Option<ConstantSearch>,
     /// Remark; may be empty.
     pub note: String,
@@ -236,11 +236,11 @@ pub fn library() -> Vec<EffectKind> {
         .collect()
 }
 
-/// The tables of the library.
+/// The entries of the program's library, parsed once.
 pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     static ENTRIES: OnceLock<Vec<EffectKindEntry>> = OnceLock::new();
     ENTRIES.get_or_init(|| {
-        // The library is no file of the user's: its places lie outside the sources, and a test keeps it sound.
+        // Its places are outside of the user's files; the assertion below and a test keep it free of faults.
         let mut log = DiagnosticLog::default();
         let table = document::parse_toml(LIBRARY, usize::MAX, &mut log);
         let span = crate::SourceSpan {
@@ -248,7 +248,8 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
             start: 0,
             end: 0,
         };
-        log.syntax_broken = true; // It is no whole model, so nothing is missing.
+        // It is not a complete model, so missing entries must not be reported.
+        log.syntax_broken = true;
         let entries = ModelEntry::from_table(&table, span, &mut log)
             .effect_kind
             .map_or_else(Vec::new, |list| list.entries);
@@ -261,7 +262,7 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
     })
 }
 
-/// The tables of a library that a file names.
+/// The kinds of a library file of the user; `file` is its index among the sources.
 pub(crate) fn own_library(
     text: &str,
     file: usize,
@@ -278,8 +279,9 @@ pub(crate) fn own_library(
         .map_or_else(Vec::new, |list| list.entries)
 }
 
-/// A kind as other crates see it.
+/// The public description of a kind.
 pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
+    // Units are listed only for loads that the places of the kind can have.
     let units = |units: &Option<UnitByPlace>| {
         PlaceLoad::ALL
             .into_iter()
@@ -337,11 +339,12 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
     }
 }
 
+/// The public form of a search entry.
 fn search(entry: &values::SearchEntry) -> ConstantSearch {
     match entry {
         values::SearchEntry::Linear => ConstantSearch::Linear,
         values::SearchEntry::Range(range) => ConstantSearch::Range {
-            // What is missing is reported where it is read.
+            // Missing bounds are reported by the reader of the entry.
             from: range.from.map_or(0.0, |number| number.value),
             to: range.to.map_or(0.0, |number| number.value),
             of: range.of.unwrap_or(Scale::One),
@@ -349,11 +352,12 @@ fn search(entry: &values::SearchEntry) -> ConstantSearch {
     }
 }
 
-/// How many places a kind must have; any number if `None`.
+/// How many places a kind must have; `None` for any number.
 pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     match entry.mechanics {
         Some(mechanics) => mechanics.entry().n_places(),
         None => {
+            // An expression that uses the motion of another place needs exactly two places.
             let expression = entry.expression.as_ref()?;
             PlaceQuantity::ALL
                 .iter()
@@ -363,6 +367,7 @@ pub(crate) fn n_places(entry: &EffectKindEntry) -> Option<usize> {
     }
 }
 
+/// Whether any place where the kind may act can have this load.
 pub(crate) fn can_carry(entry: &EffectKindEntry, carries: PlaceLoad) -> bool {
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
     places.any(|on| match on {
@@ -374,7 +379,7 @@ pub(crate) fn can_carry(entry: &EffectKindEntry, carries: PlaceLoad) -> bool {
     })
 }
 
-/// Checks a kind by itself: names, units at every place where it may act, linearity in its parameters.
+/// Checks a kind without a model: names, units for every load that it can have, linearity in its parameters.
 pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
     check_constant_values(entry, log);
     if !check_expression_or_mechanics(entry, log) {
@@ -384,12 +389,13 @@ pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
         log.push(
             Diagnostic::error(
                 expression.ast.span,
-                "this kind says how its other place moves and does not use it",
+                "this kind declares `other` but does not use the motion of the other place",
             )
             .label("expected `other_coordinate`, `other_rate` or `other_acceleration`")
-            .help("delete `other`, or use the other place's motion"),
+            .help("delete `other`, or use one of these names"),
         );
     }
+    // Each load that has all units is checked by resolving the expression with symbols in place of constants.
     let mut acts = false;
     for carries in PlaceLoad::ALL {
         if !can_carry(entry, carries) {
@@ -397,7 +403,7 @@ pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
         }
         acts = true;
         let lacking = symbols_without_unit(entry, carries);
-        // A kind for linear drives alone need not say what it would be on a joint that turns.
+        // A kind for linear drives only needs no units for revolute joints.
         if !lacking.is_empty() {
             continue;
         }
@@ -417,6 +423,7 @@ pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
             return; // One report is enough; the other places have the same fault.
         }
     }
+    // If every load lacks a unit, the kind could never be used.
     let nowhere = PlaceLoad::ALL
         .into_iter()
         .filter(|carries| can_carry(entry, *carries))
@@ -434,12 +441,13 @@ pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
                 key.span,
                 format!("the unit of `{}` fits no place of this kind", key.name),
             )
-            .label("expected units for `force`, `torque` or `point`, as `on` asks for")
+            .label("expected units for `force`, `torque` or `point`, as `on` requires")
             .help("for example `unit = { force = \"N s/m\", torque = \"N m s/rad\" }`"),
         );
     }
 }
 
+/// Checks the default values of constants, which must be numbers.
 fn check_constant_values(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
     for (_, constant) in entry
         .constants
@@ -447,7 +455,7 @@ fn check_constant_values(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
         .flat_map(|constants| &constants.entries)
     {
         if let Some(value) = &constant.value {
-            // Values of the library may only be numbers; names mean something in a model only.
+            // Names have values only inside of a model, so an empty scope is used.
             FormulaScope::default().resolve_ast(&value.ast, &[], log);
         }
     }

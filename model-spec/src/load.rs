@@ -1,4 +1,6 @@
-//! Reads a model file and those that it extends, and makes the mechanism that they describe.
+//! Reads a model file and those that it extends, and builds the mechanism that they describe.
+//!
+//! `read_chain` merges variants over their base, `read_libraries` adds kinds of effects, `build` makes the mechanism.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,40 +17,42 @@ use crate::merge::merge;
 use crate::reading::{read_referenced, read_text};
 use crate::schema::{EffectKindEntry, ModelEntry};
 
-/// Longest chain of variants.
+/// Most files in a chain of variants.
 const LONGEST_CHAIN: usize = 8;
 
-/// A model file that was read and found sound.
+/// A model file that was read and has no errors.
 #[derive(Clone, Debug)]
 pub struct LoadedModel {
     /// What the file describes.
     pub mechanism: Mechanism,
-    /// What may not be intended, such as names that nothing uses.
+    /// Findings that may not be intended, such as names that nothing uses.
     pub warnings: Vec<Diagnostic>,
     /// The files that were read.
     pub sources: SourceFiles,
     /// The kinds of effects that the file may use: the library's, then its own.
     pub kinds: Vec<EffectKind>,
-    /// Where each product of [`Mechanism::retain`] stands.
+    /// The place of each product of [`Mechanism::retain`].
     pub retain: Vec<SourceSpan>,
-    /// What the mechanism was built from, for effects that join it.
+    /// The tables that the mechanism was built from, kept to add effects later.
     pub(crate) entries: Arc<FileEntries>,
 }
 
 /// The tables of a model file and of its libraries.
 #[derive(Debug)]
 pub(crate) struct FileEntries {
+    /// The merged model file.
     pub(crate) model: ModelEntry,
+    /// Kinds of effects of all libraries of the user, in the order in which they were read.
     pub(crate) libraries: Vec<EffectKindEntry>,
 }
 
 impl LoadedModel {
-    /// The warnings as text, with the places they mean; empty if there are none.
+    /// The warnings as text with their source lines; empty if there are none.
     pub fn render(&self, color: bool) -> String {
         self.render_spelled(color, &LibrarySpelling)
     }
 
-    /// [`Loaded::render`] with advice in the words of whoever reads it.
+    /// [`LoadedModel::render`] with advice spelled for the reader's front end.
     pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
         if self.warnings.is_empty() {
             return String::new();
@@ -57,7 +61,7 @@ impl LoadedModel {
     }
 }
 
-/// A model file that has no meaning, and why.
+/// A model file with errors, and its findings.
 #[derive(Clone, Debug)]
 pub struct LoadFailure {
     /// All findings, errors and warnings, in the order of the file.
@@ -67,12 +71,12 @@ pub struct LoadFailure {
 }
 
 impl LoadFailure {
-    /// The findings as text, with the places they mean and what to do.
+    /// The findings as text with their source lines and advice.
     pub fn render(&self, color: bool) -> String {
         self.render_spelled(color, &LibrarySpelling)
     }
 
-    /// [`Failure::render`] with advice in the words of whoever reads it.
+    /// [`LoadFailure::render`] with advice spelled for the reader's front end.
     pub fn render_spelled(&self, color: bool, spelling: &dyn RemedySpelling) -> String {
         diagnostic::render(&self.diagnostics, &self.sources, color, spelling)
     }
@@ -104,9 +108,9 @@ pub fn load_file_with(
     load_with(&path.to_string_lossy(), &text, libraries, files)
 }
 
-/// Reads a model from its text; what it extends comes from `files`.
+/// Reads a model from its text; files that it extends come from `files`.
 ///
-/// `path_name` is what messages call the file, and paths in `extends` are relative to its folder.
+/// Messages call the file `path_name`, and paths in `extends` are relative to its folder.
 ///
 /// ```
 /// let text = r#"
@@ -119,7 +123,7 @@ pub fn load_file_with(
 ///     part = [{ on = "arm", linear = { planar = "1" } }]
 ///     drive = [{ name = "motor", joint = "angle" }]
 /// "#;
-/// let files = modelmill_boundary::files::Memory::default();
+/// let files = modelmill_boundary::files::MemoryFiles::default();
 /// let loaded = modelmill_spec::load("pendulum.toml", text, &files).unwrap();
 /// let names: Vec<_> = loaded.mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
 /// assert_eq!(names, ["ZZ1", "MX1", "MY1", "M1"]);
@@ -135,8 +139,8 @@ pub fn load(
     load_with(path_name, text, &[], files)
 }
 
-/// Reads a model from its text as [`load`] does, with further libraries of kinds of effects, whose paths are taken as
-/// they are.
+/// Reads a model from its text as [`load`] does, with further libraries of kinds of effects. Their paths are used
+/// unchanged.
 pub fn load_with(
     path_name: &str,
     text: &str,
@@ -146,9 +150,11 @@ pub fn load_with(
     let mut log = DiagnosticLog::default();
     let mut sources = SourceFiles::default();
     let (table, named) = read_chain(path_name, text, files, &mut sources, &mut log);
+    // Libraries of the caller come first, then those that the files name.
     let given = libraries.iter().map(|path| (path.clone(), None));
     let libraries: Vec<_> = given.chain(named).collect();
     let libraries = read_libraries(&libraries, files, &mut sources, &mut log);
+    // The top-level table has no position of its own; missing keys are reported at the start of the file.
     let whole = SourceSpan {
         file: 0,
         start: 0,
@@ -184,9 +190,9 @@ pub fn load_with(
     })
 }
 
-/// The kinds of effects of the program's library and of further ones.
+/// The kinds of effects of the program's library, followed by those of further libraries.
 ///
-/// Fails with every finding about those, each with its place.
+/// Fails with every finding about the further libraries, each with its place.
 pub fn kinds_with(
     libraries: &[PathBuf],
     files: &dyn FileSource,
@@ -208,7 +214,9 @@ pub fn kinds_with(
     Ok(kinds::library().into_iter().chain(own).collect())
 }
 
-/// Reads a file and those that it extends, and merges them, the variant over its base.
+/// Reads a file and those that it extends, and merges them: entries of a variant replace those of its base.
+///
+/// Returns the merged table and the libraries that any of the files name.
 fn read_chain(
     path_name: &str,
     text: &str,
@@ -216,6 +224,7 @@ fn read_chain(
     sources: &mut SourceFiles,
     log: &mut DiagnosticLog,
 ) -> (TomlTable, Vec<NamedPath>) {
+    // Tables are collected from the variant down to the base.
     let mut tables = Vec::new();
     let mut libraries = Vec::new();
     let mut path = PathBuf::from(path_name);
@@ -238,6 +247,7 @@ fn read_chain(
             None => break,
         }
     }
+    // The base is last; variants are merged over it in reverse order.
     let mut merged = tables.pop().unwrap_or_default();
     while let Some(variant) = tables.pop() {
         merged = merge(merged, variant, log);
@@ -245,10 +255,10 @@ fn read_chain(
     (merged, libraries)
 }
 
-/// A path, and where a file names it.
+/// A path, and the place where a file names it; `None` for paths of the caller.
 type NamedPath = (PathBuf, Option<SourceSpan>);
 
-/// The libraries that a file names, relative to itself.
+/// The libraries that a file names, relative to its own folder.
 fn named_libraries(table: &TomlTable, path: &Path) -> Vec<NamedPath> {
     let Some((_, node)) = find_key(table, "library") else {
         return Vec::new();
@@ -257,7 +267,7 @@ fn named_libraries(table: &TomlTable, path: &Path) -> Vec<NamedPath> {
         TomlValue::Array(entries) => entries.as_slice(),
         _ => std::slice::from_ref(node),
     };
-    // What is no text is reported by the reader of the merged file.
+    // Entries that are not strings are reported by the reader of the merged file.
     let texts = entries.iter().filter_map(|entry| match &entry.value {
         TomlValue::Text { text, .. } => Some((text, entry.span)),
         _ => None,
@@ -268,7 +278,7 @@ fn named_libraries(table: &TomlTable, path: &Path) -> Vec<NamedPath> {
         .collect()
 }
 
-/// Reads libraries of kinds of effects, each once.
+/// Reads libraries of kinds of effects, each path once.
 fn read_libraries(
     libraries: &[NamedPath],
     files: &dyn FileSource,
@@ -292,6 +302,7 @@ fn read_libraries(
                 });
                 kinds.extend(entries);
             }
+            // The error is marked where a file names the library; a path of the caller has no place.
             Err(error) => {
                 let diagnostic = Diagnostic {
                     span: *named,
@@ -317,7 +328,7 @@ fn read_libraries(
     kinds
 }
 
-/// The file that this one extends, if any.
+/// The path and text of the file that this one extends, if any; failures are reported.
 fn extended_file(
     table: &TomlTable,
     path: &Path,
@@ -327,10 +338,10 @@ fn extended_file(
 ) -> Option<(PathBuf, String)> {
     let (_, node) = find_key(table, "extends")?;
     let TomlValue::Text { text: target, .. } = &node.value else {
-        // The merge drops a base's own keys, so the type must be looked at here.
+        // The merge drops a base's own `extends`, so its type must be checked here.
         if !sources.files.is_empty() && sources.files.len() > 1 {
             log.push(
-                Diagnostic::error(node.span, "`extends` is no path")
+                Diagnostic::error(node.span, "`extends` is not a path")
                     .label("expected a path in quotes"),
             );
         }
@@ -343,9 +354,10 @@ fn extended_file(
                 .label(label)
                 .help(help),
         );
-        // What the missing file would define is not reported as unknown.
+        // Names that the missing file would define are not reported as unknown.
         log.syntax_broken = true;
     };
+    // A file that is already in the chain would be read without end.
     if sources
         .files
         .iter()
@@ -368,7 +380,7 @@ fn extended_file(
     }
     match read_referenced(files, &next, &["schema"]) {
         Ok(text) => Some((next, text)),
-        // `.` beside a file without a folder in its path leaves no name at all.
+        // `.` next to a file without a folder in its path gives an empty path.
         Err(FileError { fault, .. })
             if fault == FileFault::Folder || next.as_os_str().is_empty() =>
         {

@@ -1,6 +1,7 @@
-//! A validated mechanism: what a model file means once every name is resolved and every check has passed.
+//! A validated mechanism: the content of a model file after every name is resolved and every check has passed.
 //!
-//! [`crate::load`] makes it, `modelmill-codegen` consumes it. Indices point into the vectors of [`Mechanism`].
+//! [`crate::load`] builds it, `modelmill-codegen` derives equations from it. Indices point into the vectors of
+//! [`Mechanism`].
 
 use num_rational::BigRational;
 
@@ -28,11 +29,11 @@ pub struct PartIdx(pub usize);
 pub struct Mechanism {
     /// Name of the model; an identifier, used for the emitted module.
     pub name: String,
-    /// One line for people.
+    /// Title of one line.
     pub title: Option<String>,
-    /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects has turned it already.
+    /// Gravity in the base frame, m/s^2; expressions over constants. A tilt among the effects is included.
     pub gravity: [ExactExpression; 3],
-    /// Known geometry and the like.
+    /// Known quantities such as geometry.
     pub constants: Vec<ModelConstant>,
     /// Dynamic parameters in the order of declaration, which orders `p_g`.
     pub parameters: Vec<DynamicParameter>,
@@ -50,26 +51,26 @@ pub struct Mechanism {
     pub loops: Vec<KinematicLoop>,
     /// Coordinates that follow others; they are passive.
     pub couplings: Vec<CoordinateCoupling>,
-    /// Drives, one per degree of freedom; what nothing drives has its row here too.
+    /// Drives, one per degree of freedom. A degree of freedom without a drive has its row here too.
     pub drives: Vec<ModelDrive>,
-    /// Drives of a mechanism that has more of them than degrees of freedom, such as cables; then none of [`Self::drives`] is
-    /// driven, and these act on all of them by their transposed Jacobian, `J' f`.
+    /// Drives of a mechanism with more drives than degrees of freedom, such as cables. Then none of [`Self::drives`]
+    /// is driven, and these act on all of them by their transposed Jacobian, `J' f`.
     pub shared_drives: Vec<ModelDrive>,
     /// Friction, drive inertia and the like.
     pub effects: Vec<ModelEffect>,
-    /// How much later than they act the forces of recordings are read, s; zero unless an effect says otherwise.
-    /// Equations and code know nothing of it: only where a model is held against a recording does it matter.
+    /// Delay of the recorded forces relative to the motion, s; zero unless an effect defines it. Equations and code
+    /// do not contain it. It matters only where a model is compared with a recording.
     pub force_delay: f64,
     /// Products of dynamic parameters whose columns should be retained, most wanted first;
     /// each is a product of powers of parameters.
     pub retain: Vec<Vec<(ParameterIdx, u32)>>,
-    /// What planned motion must keep.
+    /// Limits of planned motions.
     pub limits: MotionLimits,
-    /// Values of base parameters by their expressions, which take the place of those of the nominal parameters.
+    /// Identified values of base parameters by their expressions; they replace the values from nominal parameters.
     pub identified_base: Vec<(String, f64)>,
-    /// How recordings name their columns: ours to theirs.
+    /// How recordings name their columns: the model's names and theirs.
     pub recording: RecordingColumns,
-    /// Whether constants of the file were replaced by their values, see [`Mechanism::at_values`].
+    /// Whether constants of the file were replaced by their values, see [`Mechanism::with_numeric_constants`].
     pub is_at_values: bool,
 }
 
@@ -82,7 +83,7 @@ pub struct ModelConstant {
     pub value: f64,
     /// Unit as printed, e.g. `m`, `rad`, `m/s^2`, `1`.
     pub unit: String,
-    /// True if it is an angle (unit rad) and may stand in [`Angle`].
+    /// True if it is an angle (unit rad) and may be a term of an [`ExactAngle`].
     pub is_angle: bool,
     /// Remark of the author.
     pub note: Option<String>,
@@ -93,7 +94,7 @@ pub struct ModelConstant {
 pub struct DynamicParameter {
     /// Identifier.
     pub name: String,
-    /// Nominal value in SI units; zero where the file gives none.
+    /// Nominal value in SI units; zero if the file gives none.
     pub nominal: f64,
     /// Unit as printed.
     pub unit: String,
@@ -106,12 +107,12 @@ pub struct DynamicParameter {
 pub struct JointCoordinate {
     /// Identifier.
     pub name: String,
-    /// Angle or length.
+    /// Kind of motion: an angle, a length, or a component of a quaternion.
     pub motion: CoordinateMotion,
-    /// Passive coordinates follow from the loops or by a coupling; the others are independent.
+    /// True if loop closure or a coupling determines the coordinate; the others are independent.
     pub passive: bool,
-    /// Value at the nominal pose, which chooses the assembly mode.
-    /// For passive coordinates refined until the loops close.
+    /// Value at the nominal pose, rad or m, which selects the assembly mode. Values of passive coordinates are
+    /// refined until the loops close.
     pub nominal: f64,
 }
 
@@ -124,31 +125,34 @@ pub enum FrameAxis {
     Z,
 }
 
-/// One elementary motion from a parent frame towards its child; each acts about or along the axes reached so far.
+/// One elementary motion from a parent frame to its child. Each acts about or along the axes that the steps before it
+/// give.
 #[derive(Clone, Debug)]
 pub enum FrameStep {
     /// Rotation about an axis.
     Rotate(FrameAxis, ExactAngle),
     /// Translation along an axis.
     Translate(FrameAxis, ExactLength),
-    /// Any motion at all; the only step of a frame that hangs on the base.
+    /// Free motion; the only step of a frame on the base.
     Free(FreeBody),
 }
 
-/// How a body moves that hangs on nothing: by its position, a unit quaternion, and its twist.
+/// The coordinates of a free body: its position, a unit quaternion, and the axes of its twist.
 ///
-/// The rates of `position` are the velocity of the frame's origin, those of the quaternion's vector part the angular velocity,
-/// and accelerations are the time derivatives of these components; forces on the coordinates are the components of the
-/// wrench about the frame's origin in the same axes. So they are dual to each other, whichever axes are chosen.
+/// The rates of `position` are the velocity of the frame's origin, and those of the quaternion's vector part are the
+/// angular velocity. Accelerations are the time derivatives of these components. Forces on the coordinates are the
+/// components of the wrench about the frame's origin in the same axes. So rates and forces are dual to each other in
+/// any axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FreeBody {
-    /// Of the origin in the base frame, m.
+    /// Position of the origin in the base frame, m.
     pub position: [CoordinateIdx; 3],
-    /// w, x, y, z: it turns components in the body's axes into those in the base's. Its length does not matter.
+    /// Quaternion w, x, y, z, which transforms components in the body's axes into those in the base. Its length does
+    /// not matter.
     pub quaternion: [CoordinateIdx; 4],
-    /// In which axes velocity and force are given.
+    /// Axes of velocity and force.
     pub linear: TwistAxes,
-    /// In which axes angular velocity and moment are given.
+    /// Axes of angular velocity and moment.
     pub angular: TwistAxes,
 }
 
@@ -166,15 +170,15 @@ pub enum TwistAxes {
 pub struct ModelFrame {
     /// Identifier; `base` for the base.
     pub name: String,
-    /// Parent; the base is its own.
+    /// Parent; that of the base is the base itself.
     pub parent: FrameIdx,
-    /// Elementary motions from the parent, e.g. Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
+    /// Elementary motions from the parent, such as Rx(alpha) Tx(a) Rz(theta) Tz(d) for modified DH.
     pub steps: Vec<FrameStep>,
-    /// The convention the file used, for the frames table of a page.
+    /// The convention of the file, for the table of frames on a page.
     pub convention: FrameConvention,
 }
 
-/// How a frame was written in the file.
+/// How the file describes a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FrameConvention {
     /// The base frame.
@@ -183,7 +187,7 @@ pub enum FrameConvention {
     ModifiedDh([String; 4]),
     /// Rz(theta) Tz(d) Tx(a) Rx(alpha); the texts of a, alpha, d, theta.
     StandardDh([String; 4]),
-    /// A transform, perhaps followed by a joint; as text.
+    /// A transform, with or without a joint behind it; as text.
     Transform(String),
 }
 
@@ -203,16 +207,17 @@ pub struct FramePoint {
 pub enum PartInertia {
     /// Mass, centre of mass in the frame, and inertia about the centre (xx, xy, xz, yy, yz, zz) along the frame's axes.
     AboutCentre {
-        /// kg
+        /// Mass, kg.
         mass: ExactExpression,
-        /// m
+        /// Centre of mass in the frame, m.
         centre: [ExactExpression; 3],
-        /// kg m^2; the off-diagonal entries are elements of the inertia matrix (negative products).
+        /// Inertia about the centre, kg m^2; off the diagonal the elements of the matrix, which are negative products
+        /// of inertia.
         inertia: [ExactExpression; 6],
     },
     /// The ten linear parameters about the frame's origin.
     Linear {
-        /// kg
+        /// Mass, kg.
         mass: ExactExpression,
         /// Mass times centre, kg m.
         first_moment: [ExactExpression; 3],
@@ -224,7 +229,7 @@ pub enum PartInertia {
 /// A rigid body on a frame.
 #[derive(Clone, Debug)]
 pub struct ModelPart {
-    /// Name for people; the frame's if the file gives none.
+    /// Name; that of the frame if the file gives none.
     pub name: String,
     /// The frame that carries it.
     pub frame: FrameIdx,
@@ -232,43 +237,44 @@ pub struct ModelPart {
     pub inertial: PartInertia,
 }
 
-/// A mass concentrated at a point of a frame, or at different points for the two balances of a body.
+/// A mass concentrated at a point of a frame, or at different points in the balances of forces and of moments.
 #[derive(Clone, Debug)]
 pub struct LumpedMass {
     /// The mass; an expression over constants and parameters, kg.
     pub mass: ExactExpression,
-    /// The share of that mass which sits here.
+    /// The share of that mass at this place.
     pub share: BigRational,
     /// The frame that carries it.
     pub frame: FrameIdx,
-    /// Where the balance of forces sees it, in the frame, m; over constants and parameters.
+    /// Its place in the balance of forces, in the frame, m; over constants and parameters.
     pub force_at: [ExactExpression; 3],
-    /// Where the balance of moments about the frame's origin sees it, in the frame, m.
+    /// Its place in the balance of moments about the frame's origin, in the frame, m.
     pub moment_at: [ExactExpression; 3],
 }
 
 /// A loop closed by two points that coincide.
 #[derive(Clone, Debug)]
 pub struct KinematicLoop {
-    /// Name for people.
+    /// Name, for messages.
     pub name: String,
-    /// The points.
+    /// The two points that coincide.
     pub joins: [PointIdx; 2],
 }
 
 /// A coordinate that follows others, as by gears, a belt or a screw: `coordinate = sum of factor * other + offset`.
 #[derive(Clone, Debug)]
 pub struct CoordinateCoupling {
-    /// What follows.
+    /// The coordinate that follows.
     pub coordinate: CoordinateIdx,
-    /// What it follows, sorted, each with its factor: expressions over constants, in units of one over the other.
+    /// The coordinates that it follows, sorted, each with its factor. Factors are expressions over constants; their
+    /// unit is that of this coordinate over that of the other.
     pub terms: Vec<(CoordinateIdx, ExactExpression)>,
-    /// An expression over constants, rad or m.
+    /// The constant term, an expression over constants, rad or m.
     pub offset: ExactExpression,
 }
 
 impl CoordinateCoupling {
-    /// The value of what follows, rad or m.
+    /// The value of the coordinate that follows, rad or m; `value` gives those of symbols.
     pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
         let moved =
@@ -284,8 +290,8 @@ pub struct ModelDrive {
     pub name: String,
     /// How it acts.
     pub kind: DriveKind,
-    /// False where nothing drives the coordinate: the row of the equation of motion is there all the same, and its force is
-    /// zero unless a recording has one under this name.
+    /// False for a degree of freedom without a drive. Its row of the equation of motion exists, and its force is zero
+    /// unless a recording has a column of this name.
     pub is_driven: bool,
 }
 
@@ -308,62 +314,63 @@ pub enum DriveKind {
 pub enum EffectPlace {
     /// On a drive: adds to its force.
     Drive(DriveIdx),
-    /// On a joint coordinate, also a passive one: adds to its torque or force.
+    /// On a joint coordinate, possibly passive: adds to its torque or force.
     Coordinate(CoordinateIdx),
     /// At a point: adds a mass there.
     Point(PointIdx),
     /// On a part: adds to its inertia.
     Part(PartIdx),
-    /// On the base as a whole.
+    /// On the base, as a property of the complete mechanism.
     Base,
-    /// On the measured forces as a whole.
+    /// On the measured forces, as a property of all recordings.
     Force,
 }
 
-/// An effect of the file, with its kind's expressions put in place.
+/// An effect of the file with the expressions of its kind.
 #[derive(Clone, Debug)]
 pub struct ModelEffect {
     /// Name of the kind.
     pub kind: String,
-    /// Where it acts; its parameters are shared by all places.
+    /// Where it acts. All places share its parameters.
     pub places: Vec<EffectPlace>,
-    /// The place whose motion it has besides, where it acts at one place alone.
+    /// A second place whose motion it uses, if it acts at one place only.
     pub other: Option<EffectPlace>,
-    /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place: a force
-    /// or torque on drives and coordinates; at points the parameter is a mass and the expression its factor.
+    /// Mechanics of its own. Without them the effect is `sum of parameter * expression`, the same at every place. It
+    /// is a force or torque on drives and coordinates. At points the parameter is a mass and the expression its
+    /// factor.
     pub mechanics: Option<Mechanics>,
-    /// Its parameters; none where the effect only has constants.
+    /// Its parameters; none if the effect has constants only.
     pub terms: Vec<EffectTerm>,
     /// The values of its kind's constants by their symbols; expressions over constants.
     pub constants: Vec<(String, ExactExpression)>,
-    /// Bodies that join those of the mechanism; their parameters are those of the terms.
+    /// Bodies that are added to those of the mechanism; their parameters are those of the terms.
     pub bodies: EffectBodies,
 }
 
-/// One parameter of an effect with what it multiplies.
+/// One parameter of an effect with its factor.
 #[derive(Clone, Debug)]
 pub struct EffectTerm {
     /// Its symbol in the kind.
     pub symbol: String,
     /// The parameter, listed in [`Mechanism::parameters`] after those that the file declares.
     pub parameter: ParameterIdx,
-    /// Expression over constants and [`crate::PlaceQuantity`]; 1 where it has mechanics.
+    /// Factor of the parameter, over constants and [`crate::PlaceQuantity`]; 1 for mechanics.
     pub expression: ExactExpression,
 }
 
-/// Bodies of an effect.
+/// Bodies that an effect adds.
 #[derive(Clone, Debug, Default)]
 pub struct EffectBodies {
-    /// Parts.
+    /// Rigid bodies.
     pub parts: Vec<ModelPart>,
     /// Lumped masses.
     pub lumped_masses: Vec<LumpedMass>,
 }
 
-/// What planned motion must keep; ranges are `[low, high]`, and what is not named is not limited.
+/// Limits of planned motions. Ranges are `[low, high]`; quantities that are not listed have no limit.
 #[derive(Clone, Debug, Default)]
 pub struct MotionLimits {
-    /// Of coordinates, each at most once.
+    /// Limits of coordinates, each at most once.
     pub coordinates: Vec<(CoordinateIdx, CoordinateBounds)>,
     /// Forces of drives, N or N m.
     pub forces: Vec<(DriveIdx, [f64; 2])>,
@@ -376,20 +383,20 @@ pub struct MotionLimits {
 /// Limits of a coordinate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoordinateBounds {
-    /// rad or m
+    /// Position, rad or m.
     pub position: Option<[f64; 2]>,
-    /// rad/s or m/s; contains 0.
+    /// Rate, rad/s or m/s; contains 0.
     pub rate: Option<[f64; 2]>,
-    /// rad/s^2 or m/s^2; contains 0.
+    /// Acceleration, rad/s^2 or m/s^2; contains 0.
     pub acceleration: Option<[f64; 2]>,
 }
 
 /// How recordings name their columns.
 #[derive(Clone, Debug, Default)]
 pub struct RecordingColumns {
-    /// Pairs of our name (`t`, a coordinate, with `_d` or `_dd`, a drive) and theirs: a column, or a sum of columns
-    /// as [`crate::read_column`] reads it.
+    /// Pairs of the model's name (`t`, a coordinate, with `_d` or `_dd`, a drive) and the recording's: a column, or a
+    /// sum of columns as [`crate::read_column`] reads it.
     pub columns: Vec<(String, String)>,
-    /// By what the column of a drive is multiplied to be what acts at the joint, where it measures the motor.
+    /// Factors from the columns of drives to the load at the joint, for columns that measure the motor.
     pub torque: Vec<(String, f64)>,
 }

@@ -1,75 +1,90 @@
-//! Where points are at given coordinates, and how loops move with them: a mechanism goes in once, and is asked many
-//! times, as limits of planned motion need it.
+//! Positions of points and gaps of loops at given coordinates. A mechanism goes in once; its geometry is then
+//! evaluated many times, as the limits of planned motions require.
 
 use crate::exact::{CoordinateIdx, ModelSymbol};
 use crate::kinematics::{Vec3, rotation_from_quaternion};
 use crate::mechanism::{DriveKind, FrameAxis, FrameStep, FreeBody, Mechanism, PointIdx};
 
-/// The geometry of a mechanism with the file's constants.
+/// The geometry of a mechanism at the constants of its file.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
+    /// Number of coordinates, passive ones included.
     n_coordinates: usize,
+    /// Frames with the index of the parent and the steps from it.
     frames: Vec<(usize, Vec<NumericStep>)>,
+    /// Points with the index of the frame and the position in it, m.
     points: Vec<(usize, Vec3)>,
+    /// Pairs of points that coincide.
     loops: Vec<[usize; 2]>,
+    /// Coordinates that follow others.
     couplings: Vec<FollowerCoordinate>,
 }
 
 /// A coordinate that follows others: `offset + sum of factor * other`.
 #[derive(Clone, Debug)]
 struct FollowerCoordinate {
+    /// Index of the coordinate.
     coordinate: usize,
+    /// Indices of the others with their factors.
     terms: Vec<(usize, f64)>,
+    /// The constant term, rad or m.
     offset: f64,
 }
 
-/// One step on the way to a frame.
+/// One step from a parent frame to its child.
 #[derive(Clone, Debug)]
 enum NumericStep {
+    /// A rotation or translation.
     One(ElementaryMotion),
+    /// The motion of a free body.
     Free(FreeBody),
 }
 
 /// One elementary motion: `offset + sum of factor * coordinate` about or along an axis.
 #[derive(Clone, Debug)]
 struct ElementaryMotion {
+    /// 0, 1, 2 for x, y, z.
     axis: usize,
+    /// True for a rotation, false for a translation.
     is_rotation: bool,
+    /// The constant part, rad or m.
     offset: f64,
+    /// Indices of coordinates with their factors.
     coordinates: Vec<(usize, f64)>,
 }
 
-/// All frames at given coordinates.
+/// Poses of all frames at given coordinates.
 #[derive(Clone, Debug)]
 pub struct MechanismPoses {
+    /// In the order of the mechanism.
     frames: Vec<FramePlacement>,
 }
 
 /// A frame at given coordinates, all in the axes of the base frame.
 #[derive(Clone, Debug)]
 pub struct FramePlacement {
-    /// Row by row; its columns are the frame's axes.
+    /// Rotation by rows; its columns are the axes of the frame.
     pub rotation: [[f64; 3]; 3],
-    /// m
+    /// Origin, m.
     pub origin: [f64; 3],
     /// The joints between its parent and this frame, in the order of its steps.
     pub joint_axes: Vec<CoordinateAxis>,
-    /// Where translations led on the way from the parent's origin, m, and how many of `moved` lay behind by then.
+    /// Positions after each translation from the parent's origin, m, each with the number of `joint_axes` before it.
     pub translations: Vec<([f64; 3], usize)>,
 }
 
-/// How a coordinate moves a frame against its parent.
+/// How a coordinate moves a frame relative to its parent.
 #[derive(Clone, Copy, Debug)]
 pub struct CoordinateAxis {
     /// Position of the coordinate in [`Mechanism::coordinates`].
     pub coordinate: usize,
-    /// By what the coordinate is multiplied.
+    /// Factor of the coordinate.
     pub factor: f64,
-    /// Whether it turns about the axis; else it slides along it.
+    /// True for a rotation about the axis, false for a translation along it.
     pub is_rotation: bool,
-    /// Unit vector.
+    /// Unit vector along the axis.
     pub axis: [f64; 3],
-    /// Where the joint is reached, m.
+    /// A point on the axis, m.
     pub origin: [f64; 3],
 }
 
@@ -81,8 +96,9 @@ impl MechanismPoses {
 }
 
 impl Kinematics {
-    /// The geometry, ready to be asked.
+    /// Evaluates all constants of a mechanism; only coordinates remain variable.
     pub fn new(mechanism: &Mechanism) -> Self {
+        // With coordinates of zero only the constant part of an angle or length remains.
         let value = |symbol: ModelSymbol| match symbol {
             ModelSymbol::Coordinate(_) => 0.0,
             other => mechanism.symbol_nominal(other),
@@ -151,7 +167,9 @@ impl Kinematics {
         }
     }
 
-    /// All frames at given coordinates, rad and m, in the order of the file; one for each (asserted).
+    /// Poses of all frames at given coordinates, rad and m.
+    ///
+    /// Panics unless there is one value for each coordinate.
     pub fn poses(&self, coordinates: &[f64]) -> MechanismPoses {
         assert_eq!(
             coordinates.len(),
@@ -159,6 +177,7 @@ impl Kinematics {
             "one value for each coordinate"
         );
         let mut frames: Vec<FramePlacement> = Vec::with_capacity(self.frames.len());
+        // Parents come first, so each frame starts at its parent's pose.
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
             let (rotation, origin) = if i == 0 {
                 let unity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -182,6 +201,7 @@ impl Kinematics {
                         continue;
                     }
                 };
+                // The axis of a step is a column of the rotation that the steps before it give.
                 let direction: Vec3 = std::array::from_fn(|k| pose.rotation[k][step.axis]);
                 let mut amount = step.offset;
                 for (coordinate, factor) in &step.coordinates {
@@ -213,6 +233,7 @@ impl Kinematics {
         self.position(poses, point.0)
     }
 
+    /// A point's position in the base frame, m, by the index of the point.
     fn position(&self, poses: &MechanismPoses, point: usize) -> Vec3 {
         let (frame, at) = &self.points[point];
         let pose = &poses.frames[*frame];
@@ -221,8 +242,9 @@ impl Kinematics {
         })
     }
 
-    /// How far apart the two points of each loop are, m: three numbers for each loop; then by how much each coordinate that
-    /// follows others is off, rad or m, at the coordinates that the poses were made of.
+    /// The residuals of the constraints at the coordinates of the poses. First come the differences of the two points
+    /// of each loop, m, three per loop. Then comes the difference of each coordinate that follows others from its
+    /// value, rad or m.
     pub fn gaps(&self, poses: &MechanismPoses, coordinates: &[f64]) -> Vec<f64> {
         let ends = |l: &[usize; 2]| l.map(|point| self.position(poses, point));
         let of_loops = self.loops.iter().flat_map(|l| {
@@ -237,10 +259,11 @@ impl Kinematics {
         of_loops.chain(of_couplings).collect()
     }
 
-    /// Derivative of [`Self::gaps`] by all coordinates, one row for each gap.
+    /// Derivative of [`Self::gaps`] by all coordinates, one row per gap.
     pub fn gap_jacobian(&self, poses: &MechanismPoses) -> Vec<Vec<f64>> {
         let mut rows = vec![vec![0.0; self.n_coordinates]; 3 * self.loops.len()];
         for (l, ends) in self.loops.iter().enumerate() {
+            // The gap is the first point minus the second one.
             for (point, sign) in ends.iter().zip([1.0, -1.0]) {
                 self.visit_point_rates(poses, *point, &mut |coordinate, velocity| {
                     for k in 0..3 {
@@ -260,7 +283,8 @@ impl Kinematics {
         rows
     }
 
-    /// Shows each coordinate that moves a point, with the point's velocity for a rate of one, joint by joint.
+    /// Calls `show` for each joint that moves a point: its coordinate, and the velocity of the point for a rate of
+    /// one.
     fn visit_point_rates(
         &self,
         poses: &MechanismPoses,
@@ -269,6 +293,7 @@ impl Kinematics {
     ) {
         let at = self.position(poses, point);
         let mut frame = self.points[point].0;
+        // Follows the chain from the point's frame to the base.
         while frame != 0 {
             for moved in &poses.frames[frame].joint_axes {
                 let axis = moved.axis;
@@ -288,13 +313,16 @@ impl Kinematics {
         }
     }
 
-    /// Derivative of a drive's angle or length by all coordinates: a row of J. No loop may tie the coordinates.
+    /// Derivative of a drive's angle or length by all coordinates: one row of the drives' Jacobian.
+    ///
+    /// All coordinates count as independent, so the mechanism must have no loops.
     pub fn drive_slopes(&self, poses: &MechanismPoses, kind: DriveKind) -> Vec<f64> {
         let mut row = vec![0.0; self.n_coordinates];
         match kind {
             DriveKind::Joint(i) => row[i.0] = 1.0,
             DriveKind::Linear { from, to } => {
                 let ends = [from, to].map(|point| self.position(poses, point.0));
+                // The rate of a length is the velocity of the end relative to the start along the line.
                 let along: Vec3 = std::array::from_fn(|k| ends[1][k] - ends[0][k]);
                 let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
                 for (point, sign) in [(from, -1.0), (to, 1.0)] {
@@ -309,7 +337,7 @@ impl Kinematics {
     }
 }
 
-/// Multiplies from the right by an elementary rotation.
+/// Multiplies a rotation from the right by an elementary rotation about one of its axes.
 fn rotate_columns(rotation: &mut [Vec3; 3], axis: usize, angle: f64) {
     let (sin, cos) = angle.sin_cos();
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);

@@ -1,7 +1,9 @@
-//! Parser of exact expressions: `"2*r3 + d4"` becomes a tree whose every node knows its place in the file.
+//! Parser of exact expressions: `"2*r3 + d4"` becomes a tree in which every node has its place in the file.
 //!
 //! The grammar is that of everyday formulas: `+ - * / ^`, parentheses, `pi`, names, decimals,
 //! and the functions `sin cos sqrt abs sign tanh exp`. Nothing is rounded.
+//!
+//! Recursive descent: a sum contains products, a product contains powers, a power contains atoms.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -16,18 +18,21 @@ use crate::suggest;
 const DEEPEST: usize = 48;
 /// Most digits of one number, before and after the point together.
 const MOST_DIGITS: usize = 40;
-/// Largest exponent of a power, and of ten in a decimal.
+/// Largest exponent of a power. Exponents of ten in a decimal may be twice as large.
 const LARGEST_EXPONENT: i32 = 16;
 /// Largest product of exponents of powers of powers.
 const LARGEST_DEGREE: i32 = 64;
 
-/// Parses `text`, which stands in the file at `outer`, its characters from byte `inner` on if they can be told apart.
+/// Parses `text`, which stands in the file at `outer`. Its characters start at byte `inner`, if that is known.
+///
+/// A fault goes to the log and gives `None`.
 pub(crate) fn parse(
     text: &str,
     outer: SourceSpan,
     inner: Option<usize>,
     log: &mut DiagnosticLog,
 ) -> Option<FormulaAst> {
+    // Very long texts are refused before anything is allocated for them.
     if text.len() > LONGEST_FORMULA {
         log.push(
             Diagnostic::error(outer, "this expression is too long")
@@ -53,26 +58,36 @@ pub(crate) fn parse(
     }
 }
 
+/// The state of the parser.
 struct FormulaParser<'a> {
+    /// The text of the expression.
     text: &'a str,
+    /// Position of the next character, in bytes.
     at: usize,
+    /// Levels of sums that are open now.
     depth: usize,
+    /// The place of the complete expression in the file.
     outer: SourceSpan,
+    /// Byte in the file at which the text starts, if it stands there without escapes.
     inner: Option<usize>,
 }
 
+/// A result of the parser; the error is boxed because it is large.
 type ParseResult<T> = Result<T, Box<Diagnostic>>;
 
 impl FormulaParser<'_> {
+    /// Parses the complete text; characters behind the expression are an error.
     fn parse_complete(&mut self) -> ParseResult<FormulaAst> {
+        // An empty text has no first character that could be marked.
         self.skip_blanks();
         if self.at == self.text.len() {
             return Err(Box::new(
                 Diagnostic::error(self.outer, "this expression is empty")
                     .label("expected a number, a name or a formula")
-                    .help("write `\"0\"` for nothing"),
+                    .help("write `\"0\"` for zero"),
             ));
         }
+        // The degree is needed only inside of the parser.
         let (ast, _) = self.sum()?;
         self.skip_blanks();
         if let Some(found) = self.peek() {
@@ -81,11 +96,16 @@ impl FormulaParser<'_> {
         Ok(ast)
     }
 
+    /// Parses terms joined by `+` and `-`.
+    ///
+    /// Like all rules, it returns the tree and its degree: the largest product of nested exponents in it.
     fn sum(&mut self) -> ParseResult<(FormulaAst, i32)> {
+        // Each level of parentheses enters one sum, so depth is counted here.
         self.enter_level()?;
         let start = self.at;
         let (first, mut degree) = self.product()?;
         let mut terms = vec![first];
+        // Terms until something else than a sign follows.
         loop {
             self.skip_blanks();
             let sign = self.peek();
@@ -94,6 +114,7 @@ impl FormulaParser<'_> {
             }
             let sign_at = self.at;
             self.at += 1;
+            // The degree of a sum is the largest one of its terms.
             let (term, term_degree) = self.product()?;
             degree = degree.max(term_degree);
             terms.push(if sign == Some('-') {
@@ -103,6 +124,7 @@ impl FormulaParser<'_> {
             });
         }
         self.depth -= 1;
+        // A single term is returned without a sum around it.
         let ast = match <[FormulaAst; 1]>::try_from(terms) {
             Ok([only]) => only,
             Err(terms) => FormulaAst {
@@ -113,10 +135,12 @@ impl FormulaParser<'_> {
         Ok((ast, degree))
     }
 
+    /// Parses signs, then factors joined by `*` and `/`.
     fn product(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
         let mut minus = false;
+        // Up to two signs before a factor are accepted, in addition to the sign of a term.
         let mut signs = 0;
         while let Some(sign @ ('+' | '-')) = self.peek() {
             signs += 1;
@@ -127,7 +151,9 @@ impl FormulaParser<'_> {
             self.at += 1;
             self.skip_blanks();
         }
+        // The first factor; all further ones follow an operator.
         let (first, mut degree) = self.power()?;
+        // `a/b*c/d` is collected into one numerator and one denominator.
         let mut above = vec![first];
         let mut below = Vec::new();
         loop {
@@ -137,6 +163,7 @@ impl FormulaParser<'_> {
                 break;
             }
             self.at += 1;
+            // `**` is the power of other languages, so it gets a message of its own.
             if operator == Some('*') && self.peek() == Some('*') {
                 let span = self.span(self.at - 1, self.at + 1);
                 return Err(Box::new(
@@ -146,27 +173,32 @@ impl FormulaParser<'_> {
             }
             let (factor, factor_degree) = self.power()?;
             degree = degree.max(factor_degree);
+            // Factors and divisors are collected separately.
             if operator == Some('*') {
                 above.push(factor);
             } else {
                 below.push(factor);
             }
         }
+        // A single factor stands for itself, without a product around it.
         let span = self.span(start, self.at);
         let mut ast = if above.len() == 1 && below.is_empty() {
             above.swap_remove(0)
         } else {
             fraction(above, below, span)?
         };
+        // The sign of the term is applied to the complete product.
         if minus {
             ast = negative(ast, span);
         }
         Ok((ast, degree))
     }
 
+    /// Parses an atom with an optional integer exponent, such as `x^2` or `x^(-1)`.
     fn power(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
         let start = self.at;
+        // The base, then an optional `^`.
         let (base, degree) = self.atom()?;
         self.skip_blanks();
         if self.peek() != Some('^') {
@@ -174,6 +206,7 @@ impl FormulaParser<'_> {
         }
         self.at += 1;
         self.skip_blanks();
+        // The exponent is an integer, optionally in parentheses and with a sign.
         let exponent_start = self.at;
         let bracket = self.peek() == Some('(');
         if bracket {
@@ -189,7 +222,9 @@ impl FormulaParser<'_> {
         while self.peek().is_some_and(|found| found.is_ascii_digit()) {
             self.at += 1;
         }
+        // An empty text of digits fails below.
         let digits = &self.text[digits_start..self.at];
+        // A parenthesis of the exponent must be closed.
         if bracket {
             self.skip_blanks();
             if self.peek() == Some(')') {
@@ -198,10 +233,12 @@ impl FormulaParser<'_> {
                 return Err(self.bad_exponent(exponent_start));
             }
         }
+        // `x^2.5` and `x^2a` are reported as exponents, not as text behind an expression.
         let after = self.peek();
         if matches!(after, Some('.')) || after.is_some_and(char::is_alphabetic) {
             return Err(self.bad_exponent(exponent_start));
         }
+        // Exponents are limited, because powers are expanded later.
         let exponent = match digits.parse::<i32>() {
             Ok(value) if value <= LARGEST_EXPONENT => {
                 if minus {
@@ -212,6 +249,7 @@ impl FormulaParser<'_> {
             }
             _ => return Err(self.bad_exponent(exponent_start)),
         };
+        // Nested powers multiply their exponents; the limit keeps expanded polynomials small.
         let degree = degree.saturating_mul(exponent.abs().max(1));
         if degree > LARGEST_DEGREE {
             return Err(Box::new(
@@ -222,6 +260,7 @@ impl FormulaParser<'_> {
                 .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
             ));
         }
+        // Zero to a negative power is found here if the base is a number; other cases are found with values.
         if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero())
         {
             return Err(Box::new(Diagnostic::error(
@@ -239,11 +278,14 @@ impl FormulaParser<'_> {
         ))
     }
 
+    /// Parses a number, a name, a function call or an expression in parentheses.
     fn atom(&mut self) -> ParseResult<(FormulaAst, i32)> {
         self.skip_blanks();
+        // The first character decides the rule.
         let start = self.at;
         match self.peek() {
             Some('(') => {
+                // The expression in parentheses gets the place of the parentheses.
                 self.at += 1;
                 let (mut inner, degree) = self.sum()?;
                 self.close_parenthesis(start)?;
@@ -263,6 +305,7 @@ impl FormulaParser<'_> {
             }
             Some(found) if found.is_ascii_alphabetic() || found == '_' => self.name_or_function(),
             Some(found) => Err(self.unexpected_character(found)),
+            // The text ends where an operand must follow.
             None => {
                 let span = self.span(self.at.saturating_sub(1), self.at);
                 Err(Box::new(
@@ -273,8 +316,10 @@ impl FormulaParser<'_> {
         }
     }
 
+    /// Parses a name, `pi`, or a function with its operand in parentheses.
     fn name_or_function(&mut self) -> ParseResult<(FormulaAst, i32)> {
         let start = self.at;
+        // A name: a letter or `_`, then letters, digits and `_`.
         while self
             .peek()
             .is_some_and(|found| found.is_ascii_alphanumeric() || found == '_')
@@ -284,6 +329,7 @@ impl FormulaParser<'_> {
         let name = self.text[start..self.at].to_owned();
         let span = self.span(start, self.at);
         self.skip_blanks();
+        // Without a parenthesis it is a name, or a function without its operand.
         if self.peek() != Some('(') {
             if FUNCTIONS.iter().any(|(function, _)| *function == name) {
                 return Err(Box::new(
@@ -298,6 +344,7 @@ impl FormulaParser<'_> {
             };
             return Ok((FormulaAst { span, kind }, 1));
         }
+        // A name before a parenthesis must be a function.
         let known = FUNCTIONS.iter().map(|(function, _)| *function);
         let Some(&(_, function)) = FUNCTIONS.iter().find(|(function, _)| *function == name) else {
             let diagnostic =
@@ -309,6 +356,7 @@ impl FormulaParser<'_> {
                 known,
             ))));
         };
+        // The operand is a complete expression.
         let open = self.at;
         self.at += 1;
         let (inner, degree) = self.sum()?;
@@ -323,10 +371,11 @@ impl FormulaParser<'_> {
         ))
     }
 
-    /// A decimal as an exact rational, such as `0.316` or `2.5e-3`.
+    /// Parses a decimal as an exact rational, such as `0.316` or `2.5e-3`.
     fn number(&mut self) -> ParseResult<BigRational> {
         let start = self.at;
         let mut digits = String::new();
+        // The digits are read as one integer; the decimals and the exponent give a power of ten.
         let mut n_decimals = 0_i32;
         let mut point = false;
         while let Some(found) = self.peek() {
@@ -338,6 +387,7 @@ impl FormulaParser<'_> {
                 '.' if !point => point = true,
                 _ => break,
             }
+            // Digits are limited, because exact numbers grow without bound.
             if digits.len() > MOST_DIGITS {
                 return Err(Box::new(
                     Diagnostic::error(
@@ -350,6 +400,7 @@ impl FormulaParser<'_> {
             self.at += 1;
         }
         let mut ten_power = -n_decimals;
+        // An `e` counts as an exponent only if digits follow it.
         if let Some('e' | 'E') = self.peek() {
             let rest = &self.text[self.at + 1..];
             let signed = rest.trim_start_matches(['+', '-']);
@@ -358,6 +409,7 @@ impl FormulaParser<'_> {
             if n_digits > 0 && n_signs <= 1 {
                 let exponent = rest[..n_signs + n_digits].parse::<i32>();
                 self.at += 1 + n_signs + n_digits;
+                // An exponent that does not fit an integer is out of range, too.
                 match exponent {
                     Ok(exponent) if exponent.abs() <= 2 * LARGEST_EXPONENT => {
                         ten_power += exponent;
@@ -374,12 +426,14 @@ impl FormulaParser<'_> {
                 }
             }
         }
+        // A lone point has no digits.
         let Ok(value) = digits.parse::<BigInt>() else {
             return Err(Box::new(
                 Diagnostic::error(self.span(start, self.at), "this is not a number")
                     .label("expected digits"),
             ));
         };
+        // The exact value: an integer times or over a power of ten.
         let ten = BigInt::from(10);
         Ok(if ten_power >= 0 {
             BigRational::from_integer(value * Pow::pow(ten, ten_power.unsigned_abs()))
@@ -388,15 +442,18 @@ impl FormulaParser<'_> {
         })
     }
 
+    /// Expects `)`; `open` is the position of the parenthesis that it closes.
     fn close_parenthesis(&mut self, open: usize) -> ParseResult<()> {
         self.skip_blanks();
         if self.peek() == Some(')') {
             self.at += 1;
             return Ok(());
         }
+        // Another character stands where the parenthesis should be closed.
         if let Some(found) = self.peek() {
             return Err(self.unexpected_character(found));
         }
+        // The text ends; the mark is on the opening parenthesis.
         Err(Box::new(
             Diagnostic::error(
                 self.span(open, open + 1),
@@ -406,6 +463,7 @@ impl FormulaParser<'_> {
         ))
     }
 
+    /// Counts a level of nesting and fails if there are too many.
     fn enter_level(&mut self) -> ParseResult<()> {
         self.depth += 1;
         if self.depth > DEEPEST {
@@ -421,13 +479,15 @@ impl FormulaParser<'_> {
         Ok(())
     }
 
+    /// The fault of a character that cannot stand at the current position.
     fn unexpected_character(&self, found: char) -> Box<Diagnostic> {
         let span = self.span(self.at, self.at + found.len_utf8());
         let shown = found.escape_debug();
         let diagnostic = Diagnostic::error(span, format!("unexpected `{shown}` in an expression"));
+        // Frequent mistakes get their own message.
         Box::new(match found {
             ')' => diagnostic.label("no parenthesis is open here, or its content is missing"),
-            '=' | '<' | '>' => diagnostic.label("an expression compares nothing"),
+            '=' | '<' | '>' => diagnostic.label("expressions have no comparisons"),
             '\u{2212}' => diagnostic
                 .label("this is a typographic minus")
                 .help("write the plain `-`"),
@@ -435,8 +495,8 @@ impl FormulaParser<'_> {
                 .label("this is a typographic product sign")
                 .help("write the plain `*`"),
             ',' => diagnostic
-                .label("expected a point in a decimal; functions have one operand")
-                .help("write `0.5`, not `0,5`"),
+                .label("a comma cannot stand here: decimals have a point, functions have one operand")
+                .help("write decimals with a point (`0.5`), one expression per entry: `[\"ax\", \"-ay\"]`"),
             _ if found.is_alphanumeric() || found == '(' => {
                 diagnostic.label("expected an operator: `+ - * / ^`")
             }
@@ -444,7 +504,9 @@ impl FormulaParser<'_> {
         })
     }
 
+    /// The fault of an exponent that starts at `start`; the mark extends to the end of the word.
     fn bad_exponent(&self, start: usize) -> Box<Diagnostic> {
+        // Extend the mark over letters, digits and points.
         let mut end = self.at;
         while self
             .text
@@ -466,17 +528,21 @@ impl FormulaParser<'_> {
         )
     }
 
+    /// The next character, or `None` at the end.
     fn peek(&self) -> Option<char> {
         self.text[self.at..].chars().next()
     }
 
+    /// Skips blanks, tabs and line ends.
     fn skip_blanks(&mut self) {
         while let Some(' ' | '\t' | '\n' | '\r') = self.peek() {
             self.at += 1;
         }
     }
 
+    /// The place in the file of the bytes from `start` to `end` of the text.
     fn span(&self, start: usize, end: usize) -> SourceSpan {
+        // Without known positions the complete value is marked.
         match self.inner {
             Some(inner) => SourceSpan {
                 file: self.outer.file,
@@ -488,6 +554,7 @@ impl FormulaParser<'_> {
     }
 }
 
+/// The negative of an expression; a number changes its sign instead.
 fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     let kind = match ast.kind {
         FormulaAstKind::Rational(value) => FormulaAstKind::Rational(-value),
@@ -499,7 +566,7 @@ fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     FormulaAst { span, kind }
 }
 
-/// Makes `a*c/(b*d)` of the chain `a/b*c/d`, its numbers collected into one, so that no chain is deep.
+/// Makes `a*c/(b*d)` of the chain `a/b*c/d` and collects its numbers into one, so that the tree is not deep.
 fn fraction(
     above: Vec<FormulaAst>,
     below: Vec<FormulaAst>,
@@ -508,12 +575,14 @@ fn fraction(
     let mut number = BigRational::one();
     let mut numerator = Vec::new();
     let mut denominator = Vec::new();
+    // Numeric factors are multiplied exactly; the others keep their order.
     for factor in above {
         match factor.kind {
             FormulaAstKind::Rational(value) => number *= value,
             _ => numerator.push(factor),
         }
     }
+    // Division by the number zero is found here, by other expressions when values are known.
     for factor in below {
         match factor.kind {
             FormulaAstKind::Rational(value) if value.is_zero() => {
@@ -526,6 +595,7 @@ fn fraction(
             _ => denominator.push(factor),
         }
     }
+    // A numeric factor of one is dropped, unless nothing else is above.
     if !number.is_one() || numerator.is_empty() {
         numerator.insert(
             0,
@@ -546,6 +616,7 @@ fn fraction(
     })
 }
 
+/// A product of factors; a single factor stands for itself.
 fn product(mut factors: Vec<FormulaAst>, span: SourceSpan) -> FormulaAst {
     if factors.len() == 1 {
         return factors.swap_remove(0);

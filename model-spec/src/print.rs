@@ -1,4 +1,4 @@
-//! Prints exact expressions so that the parser reads the same expression again, and evaluates them.
+//! Prints exact expressions in the syntax of the parser, and evaluates them in double precision.
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive, Zero};
@@ -17,19 +17,22 @@ impl ExactExpression {
         Self::Rational(BigRational::one())
     }
 
-    /// True for the number zero as written; a formula that happens to vanish is not recognised.
+    /// True for the number zero as written; an expression that simplifies to zero is not recognised.
     pub fn is_zero(&self) -> bool {
         matches!(self, Self::Rational(value) if value.is_zero())
     }
 
-    /// The expression as the model file would write it, symbols named by `name`.
+    /// The expression in the syntax of a model file; `name` gives the names of symbols.
+    /// The text starts in the context of a sum, where no parentheses are needed.
     pub fn to_text(&self, name: &dyn Fn(ModelSymbol) -> String) -> String {
         let mut text = String::new();
         print_expression(self, OperandPrecedence::Sum, name, &mut text);
         text
     }
 
-    /// The value in double precision, symbols valued by `value`; not finite where the expression has no value.
+    /// The value in double precision; `value` gives the values of symbols. It is not finite where the expression is
+    /// undefined.
+    /// Exact numbers are rounded only here.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         match self {
             Self::Rational(number) => to_f64(number),
@@ -50,6 +53,7 @@ impl ExactExpression {
                     ExactFunction::Cos => x.cos(),
                     ExactFunction::Sqrt => x.sqrt(),
                     ExactFunction::Abs => x.abs(),
+                    // Unlike `signum`, the sign of zero is zero.
                     ExactFunction::Sign if x > 0.0 => 1.0,
                     ExactFunction::Sign if x < 0.0 => -1.0,
                     ExactFunction::Sign => 0.0,
@@ -60,7 +64,8 @@ impl ExactExpression {
         }
     }
 
-    /// Calls `visit` with every symbol of the expression.
+    /// Calls `visit` for every occurrence of a symbol in the expression.
+    /// Symbols are visited in the order in which they are printed, also repeatedly.
     pub fn for_each_symbol(&self, visit: &mut dyn FnMut(ModelSymbol)) {
         match self {
             Self::Rational(_) | Self::Pi => {}
@@ -80,7 +85,7 @@ impl ExactExpression {
         }
     }
 
-    /// True if any symbol of the expression satisfies the condition.
+    /// True if any symbol in the expression satisfies the condition.
     pub fn mentions(&self, condition: &dyn Fn(ModelSymbol) -> bool) -> bool {
         let mut found = false;
         self.for_each_symbol(&mut |symbol| found |= condition(symbol));
@@ -102,7 +107,8 @@ impl ExactAngle {
         self.pi.is_zero() && self.terms.is_empty()
     }
 
-    /// The value in rad, symbols valued by `value`.
+    /// The value in rad; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of symbols.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         to_f64(&self.pi) * std::f64::consts::PI
             + self
@@ -114,7 +120,8 @@ impl ExactAngle {
 }
 
 impl ExactLength {
-    /// The value in m, symbols valued by `value`.
+    /// The value in m; `value` gives the values of symbols.
+    /// The fixed part, then the multiples of coordinates.
     pub fn evaluate(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         self.offset.evaluate(value)
             + self
@@ -143,8 +150,9 @@ impl Mechanism {
         }
     }
 
-    /// The nominal value of a symbol; zero for the quantities of a place, which have none.
+    /// The nominal value of a symbol; zero for the quantities of a place, which have no nominal value.
     pub fn symbol_nominal(&self, symbol: ModelSymbol) -> f64 {
+        // Each symbol has one value in the mechanism.
         match symbol {
             ModelSymbol::Constant(idx) => self.constants[idx.0].value,
             ModelSymbol::Parameter(idx) => self.parameters[idx.0].nominal,
@@ -153,7 +161,7 @@ impl Mechanism {
         }
     }
 
-    /// An expression as the model file would write it.
+    /// An expression in the syntax of the model file, with its names.
     pub fn text_of(&self, exact: &ExactExpression) -> String {
         exact.to_text(&|symbol| self.symbol_name(symbol).to_owned())
     }
@@ -164,22 +172,28 @@ pub(crate) fn to_f64(number: &BigRational) -> f64 {
     number.to_f64().unwrap_or(f64::NAN)
 }
 
-/// How tightly the surroundings of an operand bind.
+/// Precedence of the context of an operand, from weak to strong.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum OperandPrecedence {
+    /// In a sum: nothing needs parentheses.
     Sum,
+    /// In a product as its first factor: sums need parentheses.
     Product,
-    /// A later factor or a divisor, where a fraction would be read otherwise.
+    /// As a later factor or a divisor: fractions need parentheses, too.
     Factor,
+    /// As the base of a power: only numbers, names and calls need none.
     Power,
 }
 
+/// Appends an expression; parentheses are added if its own precedence is below that of its context.
+/// The parser reads the same tree again.
 fn print_expression(
     exact: &ExactExpression,
     level: OperandPrecedence,
     name: &dyn Fn(ModelSymbol) -> String,
     text: &mut String,
 ) {
+    // A negative number prints a sign and a fraction prints a slash, so both bind less than an integer.
     let own = match exact {
         ExactExpression::Rational(value) if value.is_negative() => OperandPrecedence::Sum,
         ExactExpression::Rational(value) if !value.is_integer() => OperandPrecedence::Product,
@@ -199,12 +213,14 @@ fn print_expression(
         ExactExpression::Rational(value) => text.push_str(&value.to_string()),
         ExactExpression::Pi => text.push_str("pi"),
         ExactExpression::Symbol(symbol) => text.push_str(&name(*symbol)),
+        // Terms of a sum are printed with their signs.
         ExactExpression::Sum(terms) => print_sum(terms, name, text),
         ExactExpression::Product(factors) => {
             for (i, factor) in factors.iter().enumerate() {
                 if i > 0 {
                     text.push('*');
                 }
+                // A leading number may be a fraction, because products are read from left to right.
                 let number = i == 0 && matches!(factor, ExactExpression::Rational(_));
                 let inner = if number {
                     OperandPrecedence::Product
@@ -214,7 +230,9 @@ fn print_expression(
                 print_expression(factor, inner, name, text);
             }
         }
+        // A divisor always needs parentheses around products and fractions.
         ExactExpression::Quotient(above, below) => {
+            // `(a/b)/c` needs parentheses, because chains of fractions are parsed into one.
             let inner = match **above {
                 ExactExpression::Quotient(..) => OperandPrecedence::Factor,
                 _ => OperandPrecedence::Product,
@@ -223,10 +241,12 @@ fn print_expression(
             text.push('/');
             print_expression(below, OperandPrecedence::Factor, name, text);
         }
+        // A sign is printed before a product, but before a sum only with parentheses.
         ExactExpression::Negative(inner) => {
             text.push('-');
             print_expression(inner, OperandPrecedence::Product, name, text);
         }
+        // The base of a power is printed as an atom.
         ExactExpression::Power(base, exponent) => {
             print_expression(base, OperandPrecedence::Power, name, text);
             text.push('^');
@@ -244,13 +264,16 @@ fn print_expression(
     }
 }
 
+/// Appends a sum, in which negative terms become differences.
 fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, text: &mut String) {
     for (i, term) in terms.iter().enumerate() {
+        // A negative term after the first one is subtracted.
         match term {
             ExactExpression::Negative(inner) if i > 0 => {
                 text.push_str(" - ");
                 print_expression(inner, OperandPrecedence::Product, name, text);
             }
+            // A negative number after the first term is subtracted, too.
             ExactExpression::Rational(value) if i > 0 && value.is_negative() => {
                 text.push_str(" - ");
                 text.push_str(&(-value).to_string());
@@ -259,6 +282,7 @@ fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, te
                 if i > 0 {
                     text.push_str(" + ");
                 }
+                // A sign is allowed without parentheses only at the start of the sum.
                 let inner = match term {
                     ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => {
                         OperandPrecedence::Sum
@@ -271,7 +295,7 @@ fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, te
     }
 }
 
-/// The word for a function.
+/// The name of a function in expressions.
 pub(crate) fn function_name(function: ExactFunction) -> &'static str {
     match function {
         ExactFunction::Sin => "sin",

@@ -1,4 +1,4 @@
-//! Ranges of values: `2.5` for what may reach 2.5 either way, `[-1, 2.5]` for two ends.
+//! Ranges of values: `2.5` for the range from -2.5 to 2.5, `[-1, 2.5]` for two ends.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -12,9 +12,12 @@ use crate::record::{SchemaValue, wrong_type};
 use crate::values::SpannedNumber;
 
 /// A range with its place.
+/// The file gives two ends, or one positive number for a symmetric range.
 #[derive(Clone, Debug)]
 pub(crate) struct ValueRange {
+    /// Lower and upper end, in SI units; the lower one is smaller.
     pub(crate) ends: [f64; 2],
+    /// Where the range stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -25,6 +28,7 @@ impl SchemaValue for ValueRange {
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let span = node.span;
         let ends = match &node.value {
+            // One number stands for both directions, so it must be positive.
             TomlValue::Number { .. } => {
                 let size = SpannedNumber::read(node, log)?.value;
                 if size <= 0.0 {
@@ -37,6 +41,7 @@ impl SchemaValue for ValueRange {
                 }
                 [-size, size]
             }
+            // Two numbers: both are read before either fault ends the reading.
             TomlValue::Array(entries) if entries.len() == 2 => {
                 let low = SpannedNumber::read(&entries[0], log);
                 let high = SpannedNumber::read(&entries[1], log);
@@ -44,6 +49,7 @@ impl SchemaValue for ValueRange {
             }
             _ => return wrong_type::<Self>(node, log),
         };
+        // An empty range is often one with swapped ends.
         if ends[0] >= ends[1] {
             log.push(
                 Diagnostic::error(span, "this range is empty")

@@ -1,4 +1,4 @@
-//! How files of text are read, whatever they describe: with a cap, and with what to do when it fails.
+//! Reads text files of any kind, with a limit on their size and with advice when reading fails.
 
 use std::path::Path;
 
@@ -9,9 +9,9 @@ use crate::diagnostic::{Diagnostic, DiagnosticSeverity, SourceFile, SourceFiles,
 use crate::document::LARGEST_FILE;
 use crate::load::LoadFailure;
 
-/// Reads the text of a file that a user names; `advice` is what to do when there is none.
+/// Reads the text of a file that a user names; `advice` is printed when the path leads to no file.
 ///
-/// Fails when it cannot be read, is too large to be meant, or is no text.
+/// Fails when the file cannot be read, exceeds [`LARGEST_FILE`] bytes, or is not UTF-8.
 pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<String, LoadFailure> {
     let bytes = files
         .read(path, LARGEST_FILE as u64)
@@ -22,16 +22,17 @@ pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<St
     String::from_utf8(bytes).map_err(|error| invalid_utf8(path, error.as_bytes()))
 }
 
-/// Reads the text of a file that another one names, which must hold one of these keys outside of all tables.
+/// Reads the text of a file that another file names. It must contain one of these keys outside of all tables.
 ///
-/// Fails with what the file is not, in one line and without a word of its text: nobody who hands on a model file shall
-/// learn in this way what else is on the reader's disk.
+/// Errors are one line and quote nothing of the text. A model file from someone else must not reveal the contents of
+/// other files on the reader's disk.
 pub fn read_referenced(
     files: &dyn FileSource,
     path: &Path,
     keys: &[&str],
 ) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
+    // A file with syntax errors is accepted here; the reader of the file reports them.
     let (table, _) = DeTable::parse_recoverable(&text);
     if keys.iter().any(|key| table.get_ref().contains_key(*key)) {
         return Ok(text);
@@ -42,6 +43,7 @@ pub fn read_referenced(
     Err(FileError::new(path, fault))
 }
 
+/// The error of a file that cannot be read; it has no place because there is no text.
 fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
     let help = match &error.fault {
         FileFault::Missing | FileFault::Folder => advice,
@@ -57,12 +59,13 @@ fn unreadable_file(error: &FileError, advice: &str) -> Diagnostic {
     }
 }
 
-/// What is wrong with a file whose bytes are no text, with the place of the first of them.
+/// The error of a file that is not UTF-8, marked at its first invalid byte.
 fn invalid_utf8(path: &Path, bytes: &[u8]) -> LoadFailure {
     let start = match std::str::from_utf8(bytes) {
         Ok(text) => text.len(),
         Err(error) => error.valid_up_to(),
     };
+    // The lossy text has a replacement character at the invalid byte, which the span covers.
     let text = String::from_utf8_lossy(bytes).into_owned();
     let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
     let span = SourceSpan {
@@ -72,8 +75,8 @@ fn invalid_utf8(path: &Path, bytes: &[u8]) -> LoadFailure {
     };
     LoadFailure {
         diagnostics: vec![
-            Diagnostic::error(span, "this file is no text in UTF-8")
-                .label("the first byte that is not")
+            Diagnostic::error(span, "this file is not UTF-8 text")
+                .label("the first invalid byte")
                 .help("save it as UTF-8; `modelmill` reads model files as text (TOML)"),
         ],
         sources: SourceFiles {

@@ -17,13 +17,15 @@ use crate::values::check_name;
 /// Most entries of one list or table.
 const MOST_ENTRIES: usize = 1000;
 /// A type of the schema.
+/// Reading never stops at the first fault: faults go to the log, so that one run reports all of them.
 pub(crate) trait SchemaValue: Sized {
-    /// What a place of this type holds, for messages: `a string`.
+    /// What a place of this type must contain, for messages: `a string`.
     const EXPECTED: &'static str;
     /// An example of it as TOML.
     const EXAMPLE: &'static str;
 
     /// Reads a value; a fault goes to the log and gives `None`.
+    /// The place of the node is kept in the value where later messages need it.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self>;
 }
 
@@ -43,6 +45,7 @@ pub(crate) fn wrong_type<T: SchemaValue>(node: &TomlNode, log: &mut DiagnosticLo
 /// Declares a table of the schema: a struct whose fields are all optional once read (faults are reported, not fatal),
 /// its reader and its JSON Schema.
 macro_rules! record {
+    // One table: docs, type, title for messages, then key, field, whether it is required, and type per field.
     (
         $(#[doc = $about:literal])*
         $name:ident = $title:literal {
@@ -52,6 +55,7 @@ macro_rules! record {
         $(#[doc = $about])*
         #[derive(Clone, Debug)]
         #[allow(dead_code)] // Remarks, for example, are there for people and for the schema.
+        // All fields are optional here, because a missing required field is reported and reading continues.
         pub(crate) struct $name {
             /// The place of the table.
             pub(crate) span: $crate::diagnostic::SourceSpan,
@@ -60,11 +64,12 @@ macro_rules! record {
             pub(crate) faulty: bool,
         }
 
+        // The reader.
         impl $name {
             /// The keys of the table.
             pub(crate) const KEYS: &'static [&'static str] = &[$($key),*];
 
-            /// Reads a table; every fault is reported, and what is sound comes back.
+            /// Reads a table; every fault is reported, and the fields without faults are returned.
             pub(crate) fn from_table(
                 table: &$crate::document::TomlTable,
                 span: $crate::diagnostic::SourceSpan,
@@ -87,6 +92,7 @@ macro_rules! record {
             }
         }
 
+        // A table as the value of a field of another table.
         impl $crate::record::SchemaValue for $name {
             const EXPECTED: &'static str = concat!("a table: ", $title);
             const EXAMPLE: &'static str = concat!("{ ", $crate::record::first!($($key),*), " = ... }");
@@ -99,6 +105,7 @@ macro_rules! record {
             }
         }
 
+        // The JSON Schema: docs of the fields become descriptions in editors.
         #[cfg(any(test, feature = "schema"))]
         impl schemars::JsonSchema for $name {
             fn schema_name() -> std::borrow::Cow<'static, str> {
@@ -127,6 +134,7 @@ macro_rules! record {
         }
     };
 }
+// Whether a field is required.
 macro_rules! need {
     (required) => {
         true
@@ -135,6 +143,7 @@ macro_rules! need {
         false
     };
 }
+// The first key, for examples.
 macro_rules! first {
     ($first:tt $(, $rest:tt)*) => {
         $first
@@ -143,6 +152,8 @@ macro_rules! first {
 pub(crate) use {first, need, record};
 
 /// Reads one field of a table; `required_of` lists all keys of the table if the field must be there.
+/// Returns `None` if the field is absent or faulty. A missing required field is reported, unless a misspelt key may
+/// be it.
 pub(crate) fn read_field<T: SchemaValue>(
     table: &TomlTable,
     key: &str,
@@ -154,6 +165,7 @@ pub(crate) fn read_field<T: SchemaValue>(
     if let Some((_, node)) = find_key(table, key) {
         return T::read(node, log);
     }
+    // An unknown key close to this one is reported as misspelt, so it is not reported as missing as well.
     let misspelt = |keys: &[&str]| {
         table.iter().take(MOST_ENTRIES).any(|(other, _)| {
             !keys.contains(&other.name.as_str())
@@ -174,6 +186,7 @@ pub(crate) fn read_field<T: SchemaValue>(
 }
 
 /// Reports keys that a table does not have.
+/// `known` are all keys of the table, and `title` names the table in messages.
 pub(crate) fn check_keys(table: &TomlTable, known: &[&str], title: &str, log: &mut DiagnosticLog) {
     for (key, _) in table {
         // Broken text leaves scraps that look like keys.
@@ -206,7 +219,9 @@ pub(crate) fn tidy(text: &str) -> String {
 /// A list; faulty entries are left out once they are reported.
 #[derive(Clone, Debug)]
 pub(crate) struct EntryList<T> {
+    /// The entries that could be read.
     pub(crate) entries: Vec<T>,
+    /// Where the list stands.
     pub(crate) span: SourceSpan,
     /// True if any entry was faulty.
     pub(crate) faulty: bool,
@@ -228,9 +243,11 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
             );
             return None;
         };
+        // Very long lists are refused as a unit, so that reading stays fast.
         if too_many(array.len(), node.span, log) {
             return None;
         }
+        // Faulty entries are detected by the number of errors that reading them adds.
         let n_errors = log.n_errors();
         Some(Self {
             entries: array
@@ -243,6 +260,7 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
     }
 }
 
+/// Reports a list or table with more than [`MOST_ENTRIES`] entries; true if it has more.
 fn too_many(n: usize, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     if n > MOST_ENTRIES {
         log.push(
@@ -271,7 +289,9 @@ impl<T: JsonSchema> JsonSchema for EntryList<T> {
 /// One entry, or a list of them.
 #[derive(Clone, Debug)]
 pub(crate) struct OneOrMany<T> {
+    /// The entries; exactly one if the file gives no list.
     pub(crate) entries: Vec<T>,
+    /// Where the value stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -313,6 +333,7 @@ impl<T: JsonSchema> JsonSchema for OneOrMany<T> {
 /// Entries under names of the author's choice, in the order of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct NamedEntries<T> {
+    /// The entries that could be read, with their names and the places of these.
     pub(crate) entries: Vec<(TomlKey, T)>,
     /// Names whose entries could not be read; they count as known.
     pub(crate) faulty: Vec<TomlKey>,
@@ -333,6 +354,7 @@ impl<T: SchemaValue> SchemaValue for NamedEntries<T> {
             entries: Vec::new(),
             faulty: Vec::new(),
         };
+        // An entry with a faulty name is read too, so that its own faults are reported.
         for (key, entry) in table {
             let fine = check_name(&key.name, key.span, log);
             match T::read(entry, log) {

@@ -26,11 +26,11 @@ record! {
         /// Entries of the extended file that this variant drops, as `table.name`,
         /// such as `lumped_mass.platform_left`, `constants.g` or `gravity`.
         "remove" remove: optional EntryList<SpannedText>,
-        /// Acceleration of gravity in the base frame, m/s^2; none if left away.
+        /// Acceleration of gravity in the base frame, m/s^2; none if omitted.
         "gravity" gravity: optional FormulaVector,
-        /// Known quantities: geometry, gravity and the like.
+        /// Known quantities such as geometry and gravity.
         "constants" constants: optional NamedEntries<ConstantEntry>,
-        /// Dynamic parameters, which identification may find; their order orders the equations.
+        /// Dynamic parameters, which identification may estimate; their order is that of the equations.
         "parameters" parameters: optional NamedEntries<ParameterEntry>,
         /// Joint coordinates; whether one is an angle or a length follows from its use.
         "coordinates" coordinates: optional NamedEntries<CoordinateEntry>,
@@ -54,9 +54,9 @@ record! {
         "effect_kind" effect_kind: optional EntryList<EffectKindEntry>,
         /// Products of parameters that should stay in the base parameters, most wanted first, such as `m1*dc1^2`.
         "retain" retain: optional EntryList<SourceFormula>,
-        /// What planned motion must keep: `modelmill excite` obeys it.
+        /// Limits of planned motions, which `modelmill excite` respects.
         "limits" limits: optional LimitsEntry,
-        /// What was identified, in the place of nominal values: `modelmill adopt` writes it.
+        /// Identified values, which replace nominal ones; `modelmill adopt` writes them.
         "identified" identified: optional IdentifiedEntry,
         /// How recordings of this mechanism name their columns.
         "recording" recording: optional RecordingEntry,
@@ -78,7 +78,7 @@ record! {
 record! {
     /// A dynamic parameter.
     ParameterEntry = "a parameter" {
-        /// Value from CAD or a data sheet, in SI units; zero if left away.
+        /// Value from CAD or a data sheet, in SI units; zero if omitted.
         "nominal" nominal: optional SpannedNumber,
         /// Unit.
         "unit" unit: required ModelUnit,
@@ -90,10 +90,10 @@ record! {
 record! {
     /// A joint coordinate.
     CoordinateEntry = "a coordinate" {
-        /// Value at the nominal pose, in rad or m; zero if left away.
-        /// For passive coordinates it chooses how the loops are assembled.
+        /// Value at the nominal pose, in rad or m; zero if omitted. For passive coordinates it chooses how the loops
+        /// are assembled.
         "nominal" nominal: optional SpannedNumber,
-        /// True if the coordinate follows from the loops; no drive holds it.
+        /// True if loop closure determines the coordinate; it is then not independent.
         "passive" passive: optional BooleanFlag,
         /// False if nothing drives the coordinate: its row of the equation of motion, with a force of zero, takes part in
         /// identification.
@@ -127,7 +127,7 @@ record! {
 }
 
 record! {
-    /// Denavit-Hartenberg parameters; what is left away is zero.
+    /// Denavit-Hartenberg parameters; omitted entries are zero.
     DhEntry = "a Denavit-Hartenberg row" {
         /// Length along x, m.
         "a" a: optional SourceFormula,
@@ -164,17 +164,17 @@ record! {
         /// Three angles of a spherical joint, about its `axes` one after the other, each turned by those before.
         "spherical" spherical: optional EntryList<SourceFormula>,
         /// Six coordinates of a free body: its position along x, y and z, then three angles as those of a spherical
-        /// joint; or seven, its position and a unit quaternion, of a body that hangs on nothing and needs no drives.
+        /// joint; or seven, its position and a unit quaternion, of a free body, which needs no drives.
         "free" free: optional EntryList<SourceFormula>,
-        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It turns the body's axes into those
-        /// of the base.
+        /// Order of the quaternion of a free body with seven coordinates: `xyzw` or `wxyz`. It transforms components in
+        /// the axes of the body into components in the axes of the base.
         "quaternion" quaternion: optional QuaternionOrder,
         /// Axes of its velocity, angular velocity, force and moment: `body`, `world`, or `mixed` for velocity and force in
         /// those of the base, angular velocity and moment in those of the body.
         "twist" twist: optional TwistName,
-        /// Axis of a revolute, prismatic or cylindrical joint; z if left away.
+        /// Axis of a revolute, prismatic or cylindrical joint; z if omitted.
         "axis" axis: optional AxisName,
-        /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if left away.
+        /// Axes of a universal, spherical or free joint, such as `yz` or `zyx`; `xy` or `zyx` if omitted.
         "axes" axes: optional SpannedText,
     }
 }
@@ -194,10 +194,10 @@ record! {
 }
 
 record! {
-    /// A rigid body: either `mass`, `centre` and `inertia` about the centre, or the `linear` parameters
-    /// about the frame's origin. What is left away is exactly zero.
+    /// A rigid body: either `mass`, `centre` and `inertia` about the centre, or the `linear` parameters about the
+    /// frame's origin. Omitted entries are exactly zero.
     PartEntry = "a part" {
-        /// Name; the frame's if left away.
+        /// Name; that of the frame if omitted.
         "name" name: optional SpannedName,
         /// The frame that carries it.
         "on" on: required SpannedName,
@@ -233,10 +233,9 @@ record! {
 }
 
 record! {
-    /// The linear parameters of a body about its frame's origin.
-    /// `all = "1"` stands for the ten parameters XX1, XY1, ..., M1, `planar = "1"` for ZZ1, MX1, MY1, M1;
-    /// both declare those parameters, and bodies with the same suffix share them.
-    /// Single entries replace what the shorthand says; what neither names is exactly zero.
+    /// The linear parameters of a body about its frame's origin. `all = "1"` stands for the ten parameters XX1, XY1,
+    /// ..., M1, `planar = "1"` for ZZ1, MX1, MY1, M1; both declare those parameters, and bodies with the same suffix
+    /// share them. Single entries replace those of the shorthand; all others are exactly zero.
     LinearEntry = "a set of linear parameters" {
         /// Suffix of ten parameters: XX, XY, XZ, YY, YZ, ZZ, MX, MY, MZ, M.
         "all" all: optional NameSuffix,
@@ -268,7 +267,7 @@ record! {
 }
 
 record! {
-    /// Nominal values of linear parameters; zero if left away.
+    /// Nominal values of linear parameters; zero if omitted.
     LinearNominalEntry = "a set of nominal values" {
         /// kg m^2
         "XX" xx: optional SpannedNumber,
@@ -294,21 +293,21 @@ record! {
 }
 
 record! {
-    /// A mass concentrated at a point; the balances of forces and of moments may see it at different places.
+    /// A mass concentrated at a point; it may have different places in the balances of forces and of moments.
     LumpedMassEntry = "a lumped mass" {
         /// Name, by which a variant can override it.
         "name" name: optional SpannedName,
         /// The mass, kg.
         "mass" mass: required SourceFormula,
-        /// The share of that mass which sits here, a rational number such as `1/2`; 1 if left away.
+        /// The share of that mass at this place, a rational number such as `1/2`; 1 if omitted.
         "share" share: optional SourceFormula,
         /// The frame that carries it; the point's if `at` names a point.
         "on" on: optional SpannedName,
-        /// Where it sits: a point's name, or a position in the frame, m.
+        /// Its place: a point's name, or a position in the frame, m.
         "at" at: optional LumpedMassPlace,
-        /// Where the balance of forces sees it, if not `at`.
+        /// Its place in the balance of forces, if not `at`.
         "force_at" force_at: optional LumpedMassPlace,
-        /// Where the balance of moments about the frame's origin sees it, if not `at`.
+        /// Its place in the balance of moments about the frame's origin, if not `at`.
         "moment_at" moment_at: optional LumpedMassPlace,
         /// Remark.
         "note" note: optional SpannedText,
@@ -359,8 +358,8 @@ record! {
         /// Where it acts: a drive, a coordinate, a point or a part, `base` or `force`, as its kind has it, or a list
         /// whose members share the parameters.
         "at" at: required OneOrMany<SpannedName>,
-        /// Names and nominal values of its parameters, by the kind's symbols.
-        /// A parameter is called `symbol_place` if nothing is said.
+        /// Names and nominal values of its parameters, by the kind's symbols. A parameter without a name here is
+        /// called `symbol_place`.
         "parameters" parameters: optional NamedEntries<EffectParameterEntry>,
         /// Values of the kind's constants: numbers, or expressions over the constants of this file.
         "constants" constants: optional NamedEntries<SourceFormula>,
@@ -374,7 +373,7 @@ record! {
     EffectParameterEntry = "a parameter of an effect" {
         /// Its name; a name that is declared elsewhere shares that parameter.
         "name" name: optional SpannedName,
-        /// Nominal value in SI units; zero if left away.
+        /// Nominal value in SI units; zero if omitted.
         "nominal" nominal: optional SpannedNumber,
     }
 }
@@ -390,8 +389,8 @@ record! {
         /// linear in them, and in `coordinate`, `rate`, `acceleration` and `load` of the place. A kind that uses
         /// `other_coordinate`, `other_rate` or `other_acceleration` acts on two places, at each with the other's.
         "expression" expression: optional SourceFormula,
-        /// That it acts at the first of its two places alone, with the motion of the second, which turns (`angle`) or slides
-        /// (`length`).
+        /// States that it acts at the first of its two places only, with the motion of the second one, which is
+        /// revolute (`angle`) or prismatic (`length`).
         "other" other: optional OtherMotion,
         /// What it does in place of an expression: a swinging `rod` along a linear drive, another `placement` of
         /// lumped masses, differences of a `part`, a `tilt` of gravity, a `delay` of the measured forces.
@@ -402,11 +401,11 @@ record! {
         "constants" constants: optional NamedEntries<KindConstantEntry>,
         /// One sentence that explains it.
         "says" says: required SpannedText,
-        /// One paragraph: what it is, where it comes from, and how an error that it leaves looks.
+        /// One paragraph: what it is, where it comes from, and how the error looks if a model lacks it.
         "explains" explains: optional SpannedText,
-        /// What it is easily taken for, and which experiment tells them apart.
+        /// Effects it can be confused with, and the experiment that distinguishes them.
         "doubles" doubles: optional SpannedText,
-        /// A simpler kind that it holds as a special case and is looked for before it.
+        /// A simpler kind that is a special case of it and is tried before it.
         "refines" refines: optional SpannedText,
     }
 }
@@ -424,7 +423,7 @@ record! {
     KindParameterEntry = "a parameter of a kind" {
         /// Its unit, or its units where the place carries a force, a torque, or a mass at a point.
         "unit" unit: required UnitByPlace,
-        /// The sign that it must have to make physical sense; any if left away.
+        /// The sign that it must have to make physical sense; any if omitted.
         "sign" sign: optional Sign,
         /// Remark.
         "note" note: optional SpannedText,
@@ -436,9 +435,9 @@ record! {
     KindConstantEntry = "a constant of a kind" {
         /// Its unit, or its units where the place carries a force or a torque.
         "unit" unit: required UnitByPlace,
-        /// Its value where the effect gives none; an effect must give one if this is left away.
+        /// Its value where the effect gives none; an effect must give one if this is omitted.
         "value" value: optional SourceFormula,
-        /// How its value is found where it is not known: `linear` where the expression is affine in it, or a range.
+        /// How its value is found if it is not known: `linear` where the expression is affine in it, or a range.
         "search" search: optional SearchEntry,
         /// Remark.
         "note" note: optional SpannedText,
@@ -452,14 +451,14 @@ record! {
         "from" from: required SpannedNumber,
         /// The largest value.
         "to" to: required SpannedNumber,
-        /// What both are multiples of: the largest `rate` of the place, the `travel` of its coordinate, or `one`,
-        /// for values in SI units; `one` if left away.
+        /// The scale of both: the largest `rate` of the place, the `travel` of its coordinate, or `one`, for values
+        /// in SI units; `one` if omitted.
         "of" of: optional Scale,
     }
 }
 
 record! {
-    /// What planned motion must keep; what is not named is not limited.
+    /// Limits of planned motions; quantities that are not named have no limit.
     LimitsEntry = "the table of limits" {
         /// Limits of coordinates, by name.
         "coordinates" coordinates: optional NamedEntries<CoordinateLimitsEntry>,
@@ -507,11 +506,11 @@ record! {
 }
 
 record! {
-    /// What was identified. It takes the place of nominal values.
+    /// Identified values. They replace nominal values.
     IdentifiedEntry = "what was identified" {
-        /// Values of parameters, which bodies can have.
+        /// Values of parameters that are physically possible.
         "parameters" parameters: optional NamedEntries<SpannedNumber>,
-        /// Values of base parameters, which say nothing of single bodies.
+        /// Values of base parameters, which are combinations over several bodies.
         "base" base: optional EntryList<IdentifiedBaseEntry>,
     }
 }
@@ -529,10 +528,9 @@ record! {
 record! {
     /// How recordings name their columns.
     RecordingEntry = "the recording" {
-        /// Our names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, a drive with `_var` for the
-        /// variance of its force) and theirs: the name of a column,
-        /// or a sum of columns such as `(pos6 - pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in
-        /// SI units: `pos1 [deg]`.
+        /// The model's names (`t`, a coordinate, a coordinate with `_d` or `_dd`, a drive, a drive with `_var` for
+        /// the variance of its force) and the recording's: the name of a column, or a sum of columns such as `(pos6 -
+        /// pos5)/32 - pi/2`, with a unit in brackets behind it if it is not in SI units: `pos1 [deg]`.
         "columns" columns: optional NamedEntries<SpannedText>,
         /// What the columns of drives measure, where it is not what acts at the joint: by the name of the drive.
         "torque" torque: optional NamedEntries<TorqueEntry>,
@@ -542,7 +540,7 @@ record! {
 record! {
     /// What the column of a drive measures: the motor's torque or current rather than what acts at the joint.
     TorqueEntry = "what the column of a drive measures" {
-        /// Turns of the motor for one of the joint, with its sign; 1 if it is not given.
+        /// Turns of the motor per turn of the joint, with its sign; 1 if it is not given.
         "ratio" ratio: optional SpannedNumber,
         /// N m/A, where the column is a current.
         "constant" constant: optional SpannedNumber,

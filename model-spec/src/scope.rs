@@ -1,7 +1,7 @@
-//! The names that an expression may use, with their meanings and dimensions.
+//! The names that an expression may use, with their values and dimensions.
 //!
-//! A parsed expression and a scope go in, an [`Exact`] comes out; every unknown name and every clash
-//! of units in it is reported.
+//! A parsed expression and a scope go in, an [`ExactExpression`] comes out. Every unknown name and every sum of
+//! different units in it is reported.
 
 use std::cell::Cell;
 use std::collections::BTreeMap;
@@ -15,16 +15,21 @@ use crate::suggest;
 use crate::unit::UnitDimension;
 use crate::values::check_not_reserved;
 
-/// What sort of thing a name stands for.
+/// The sort of quantity that a name stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SymbolSort {
+    /// A known quantity of the file.
     Constant,
+    /// A dynamic parameter.
     Parameter,
+    /// A joint coordinate.
     Coordinate,
+    /// A quantity of the place of an effect, such as `rate`.
     Place,
 }
 
 impl SymbolSort {
+    /// The sort, for messages.
     fn name(self) -> &'static str {
         match self {
             Self::Constant => "a constant",
@@ -35,46 +40,52 @@ impl SymbolSort {
     }
 }
 
-/// The meaning of a name.
+/// The quantity that a name stands for.
 #[derive(Clone, Debug)]
 pub(crate) struct SymbolMeaning {
+    /// Its sort, which decides where the name may be used.
     pub(crate) sort: SymbolSort,
+    /// The expression that replaces the name.
     pub(crate) exact: ExactExpression,
-    /// Unknown where the unit was faulty; then it fits anything.
+    /// Dimension; `None` where the unit was faulty, which then fits any other.
     pub(crate) dimension: Option<UnitDimension>,
-    /// The unit as printed.
+    /// The unit as the file writes it; may be empty.
     pub(crate) unit: String,
-    /// The number that the file gives it; only constants have one.
+    /// The number that the file gives; only constants have one.
     pub(crate) value: Option<f64>,
+    /// Where the file declares it; `None` for names that the program declares.
     pub(crate) declared: Option<SourceSpan>,
+    /// Whether an expression used it; a cell, because resolving borrows the scope.
     pub(crate) used: Cell<bool>,
 }
 
-/// Names and their meanings.
+/// Names and the quantities that they stand for.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FormulaScope {
+    /// By name.
     names: BTreeMap<String, SymbolMeaning>,
 }
 
-/// What an expression must be.
+/// What an expression must satisfy.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FormulaRequirement<'a> {
-    /// Its sorts of names.
+    /// Sorts of names that it may use.
     pub(crate) sorts: &'a [SymbolSort],
-    /// Its dimension.
+    /// Dimension that it must have.
     pub(crate) dimension: UnitDimension,
-    /// What it is, for messages: `the mass of a part`.
+    /// The quantity that it describes, for messages: `the mass of a part`.
     pub(crate) what: &'a str,
 }
 
 impl FormulaScope {
-    /// Adds a name; a second definition is reported and gives false.
+    /// Adds a name; a second definition or a reserved word is reported and gives false.
     pub(crate) fn declare(
         &mut self,
         name: &str,
         meaning: SymbolMeaning,
         log: &mut DiagnosticLog,
     ) -> bool {
+        // A second definition is reported with the place of the first one.
         if let (Some(span), Some(first)) = (meaning.declared, self.names.get(name)) {
             let mut diagnostic =
                 Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
@@ -91,6 +102,7 @@ impl FormulaScope {
             log.push(diagnostic);
             return false;
         }
+        // Names of the program have no place and may be reserved words.
         if let Some(span) = meaning.declared
             && !check_not_reserved(name, span, log)
         {
@@ -100,19 +112,21 @@ impl FormulaScope {
         true
     }
 
-    /// Looks a name up.
+    /// The quantity of a name, without marking it as used.
     pub(crate) fn get(&self, name: &str) -> Option<&SymbolMeaning> {
         self.names.get(name)
     }
 
-    /// All names with their meanings.
+    /// All names in alphabetical order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &SymbolMeaning)> {
         self.names
             .iter()
             .map(|(name, meaning)| (name.as_str(), meaning))
     }
 
-    /// Looks up a name that must be of one of the given sorts, reports it otherwise, and marks it as used.
+    /// The quantity of a name, which is marked as used. Unknown names and other sorts are reported.
+    ///
+    /// `sorts` are those that may be used at this place.
     pub(crate) fn look_up(
         &self,
         name: &str,
@@ -120,12 +134,14 @@ impl FormulaScope {
         sorts: &[SymbolSort],
         log: &mut DiagnosticLog,
     ) -> Option<&SymbolMeaning> {
+        // Names of the right sorts, for the advice.
         let allowed = || {
             self.names
                 .iter()
                 .filter(|(_, meaning)| sorts.contains(&meaning.sort))
                 .map(|(name, _)| name.as_str())
         };
+        // The list of sorts for the label, such as `a constant or a parameter`.
         let list = sorts
             .iter()
             .map(|sort| sort.name())
@@ -133,6 +149,7 @@ impl FormulaScope {
             .join(" or ");
         let Some(meaning) = self.names.get(name) else {
             if !log.is_full() {
+                // Candidates are collected only if the finding will be kept: large files with many faults stay fast.
                 let candidates: Vec<&str> = allowed().collect();
                 let removal = log.removal(&["constants", "parameters", "coordinates"], name);
                 log.push(
@@ -145,6 +162,7 @@ impl FormulaScope {
             }
             return None;
         };
+        // A wrong use counts as a use, so that the name is not reported as unused, too.
         meaning.used.set(true);
         if !sorts.contains(&meaning.sort) {
             let diagnostic = Diagnostic::error(
@@ -164,7 +182,9 @@ impl FormulaScope {
         Some(meaning)
     }
 
-    /// Gives an expression its meaning; faults are reported.
+    /// Resolves an expression to exact form; `None` after any error, each of which is reported.
+    ///
+    /// `wanted` gives the sorts of names, the dimension, and the name of the quantity in messages.
     pub(crate) fn resolve(
         &self,
         formula: &SourceFormula,
@@ -172,6 +192,7 @@ impl FormulaScope {
         log: &mut DiagnosticLog,
     ) -> Option<ExactExpression> {
         let before = log.n_errors();
+        // First the names, then the value at the constants of the file, then the dimension.
         let (exact, dimension) = self.resolve_ast(&formula.ast, wanted.sorts, log)?;
         self.check_value(&formula.ast, log);
         if let Some(found) = dimension
@@ -198,7 +219,9 @@ impl FormulaScope {
         self.get(name)?.value
     }
 
-    /// Reports an expression without a finite value at the constants of the file.
+    /// Reports an expression whose value at the constants of the file is not finite.
+    ///
+    /// Parts with coordinates or parameters have no value and are not reported.
     fn check_value(&self, ast: &FormulaAst, log: &mut DiagnosticLog) {
         if let Err(fault) = finite::value(ast, &|name| self.value(name)) {
             let declared = match &fault.piece.kind {
@@ -209,13 +232,14 @@ impl FormulaScope {
         }
     }
 
-    /// The meaning and dimension of a subexpression; `None` as a dimension fits any, as bare numbers do.
+    /// The exact form and dimension of a subexpression. A dimension of `None` fits any, as that of bare numbers does.
     pub(crate) fn resolve_ast(
         &self,
         ast: &FormulaAst,
         sorts: &[SymbolSort],
         log: &mut DiagnosticLog,
     ) -> Option<(ExactExpression, Option<UnitDimension>)> {
+        // Bare numbers fit any dimension.
         match &ast.kind {
             FormulaAstKind::Rational(value) => {
                 Some((ExactExpression::Rational(value.clone()), None))
@@ -225,8 +249,10 @@ impl FormulaScope {
                 let meaning = self.look_up(name, ast.span, sorts, log)?;
                 Some((meaning.exact.clone(), meaning.dimension))
             }
+            // Terms of a sum must have the same dimension.
             FormulaAstKind::Sum(terms) => {
                 let mut sum = Vec::new();
+                // The first term with a dimension decides; all others must agree with it.
                 let mut dimension: Option<(UnitDimension, SourceSpan)> = None;
                 let mut faulty = false;
                 for term in terms {
@@ -237,6 +263,7 @@ impl FormulaScope {
                     sum.push(exact);
                     match (dimension, found) {
                         (None, Some(found)) => dimension = Some((found, term.span)),
+                        // Both places are marked: the term, and the first term with a dimension.
                         (Some((first, first_span)), Some(found)) if first != found => {
                             log.push(
                                 Diagnostic::error(
@@ -259,6 +286,7 @@ impl FormulaScope {
             }
             FormulaAstKind::Product(factors) => {
                 let mut product = Vec::new();
+                // Bare numbers in a product do not change its dimension.
                 let mut dimension: Option<UnitDimension> = None;
                 let mut faulty = false;
                 for factor in factors {
@@ -274,10 +302,12 @@ impl FormulaScope {
                 }
                 (!faulty).then_some((ExactExpression::Product(product), dimension))
             }
+            // A quotient has the quotient of the dimensions.
             FormulaAstKind::Quotient(above, below) => {
                 let above = self.resolve_ast(above, sorts, log);
                 let below = self.resolve_ast(below, sorts, log);
                 let ((above, upper), (below, lower)) = (above?, below?);
+                // A bare number above or below counts as dimensionless once the other side has a dimension.
                 let dimension = match (upper, lower) {
                     (None, None) => None,
                     (upper, lower) => Some(
@@ -295,6 +325,7 @@ impl FormulaScope {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
                 Some((ExactExpression::Negative(Box::new(exact)), dimension))
             }
+            // An integer power multiplies all exponents of the dimension.
             FormulaAstKind::Power(base, exponent) => {
                 let (exact, dimension) = self.resolve_ast(base, sorts, log)?;
                 Some((
@@ -314,7 +345,7 @@ impl FormulaScope {
     }
 }
 
-/// The dimension of a function's value; a wrong operand is reported.
+/// The dimension of a function's value; an operand that does not fit is reported.
 #[allow(clippy::option_option)] // Outer: faulty or not; inner: fits any dimension.
 fn function_dimension(
     function: ExactFunction,
@@ -324,8 +355,10 @@ fn function_dimension(
 ) -> Option<Option<UnitDimension>> {
     match (function, operand) {
         (ExactFunction::Abs, operand) => Some(operand),
+        // The sign of any quantity is a pure number.
         (ExactFunction::Sign, _) => Some(Some(UnitDimension::ONE)),
         (ExactFunction::Sqrt, None) => Some(None),
+        // The square root halves all exponents of the dimension.
         (ExactFunction::Sqrt, Some(found)) => {
             let root = found.square_root();
             if root.is_none() {
@@ -340,6 +373,7 @@ fn function_dimension(
             ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp,
             operand,
         ) => {
+            // All other functions need a pure number or an angle.
             if let Some(found) = operand
                 && found != UnitDimension::ONE
             {
@@ -361,7 +395,7 @@ fn function_dimension(
     }
 }
 
-/// A symbol's meaning.
+/// The entry of the scope for a symbol of the model, not used yet and without a value.
 pub(crate) fn symbol_meaning(
     sort: SymbolSort,
     symbol: ModelSymbol,

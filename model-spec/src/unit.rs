@@ -1,6 +1,6 @@
 //! Units and their algebra: `"kg m^2"`, `"N s/m"` become powers of kg, m, s and A.
 //!
-//! Only coherent SI units are known, so that no factor ever enters; rad counts as 1.
+//! Only coherent SI units are known, so that no conversion factor is needed; rad counts as 1.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -10,7 +10,7 @@ use crate::document::{TomlNode, TomlValue, quote};
 use crate::record::SchemaValue;
 use crate::suggest;
 
-/// Twice the exponents of kg, m, s, A; twice, so that square roots stay whole.
+/// Twice the exponents of kg, m, s, A; doubled, so that exponents of square roots are integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct UnitDimension([i32; 4]);
 
@@ -35,7 +35,7 @@ const UNITS: [(&str, [i32; 4]); 17] = [
     ("T", [1, 0, -2, -1]),
 ];
 
-/// Units that people write and that would need a factor.
+/// Common units that would need a factor, each with the SI unit to use instead.
 const FOREIGN: [(&str, &str); 14] = [
     ("mm", "m"),
     ("cm", "m"),
@@ -53,7 +53,7 @@ const FOREIGN: [(&str, &str); 14] = [
     ("lb", "kg"),
 ];
 
-/// How common dimensions are printed, and what people call them.
+/// How common dimensions are printed: unit, single exponents of kg, m, s, A, and name.
 const PRINTED: [(&str, [i32; 4], &str); 18] = [
     ("1", [0, 0, 0, 0], "a pure number or an angle"),
     ("m", [0, 1, 0, 0], "a length"),
@@ -76,42 +76,61 @@ const PRINTED: [(&str, [i32; 4], &str); 18] = [
 ];
 
 impl UnitDimension {
+    /// A pure number or an angle.
     pub(crate) const ONE: Self = Self::new([0, 0, 0, 0]);
+    /// s
     pub(crate) const TIME: Self = Self::new([0, 0, 1, 0]);
+    /// m
     pub(crate) const LENGTH: Self = Self::new([0, 1, 0, 0]);
+    /// kg
     pub(crate) const MASS: Self = Self::new([1, 0, 0, 0]);
+    /// kg m, mass times a distance.
     pub(crate) const FIRST_MOMENT: Self = Self::new([1, 1, 0, 0]);
+    /// kg m^2
     pub(crate) const INERTIA: Self = Self::new([1, 2, 0, 0]);
+    /// m/s^2
     pub(crate) const ACCELERATION: Self = Self::new([0, 1, -2, 0]);
+    /// N
     pub(crate) const FORCE: Self = Self::new([1, 1, -2, 0]);
+    /// N m
     pub(crate) const TORQUE: Self = Self::new([1, 2, -2, 0]);
+    /// N/m
     pub(crate) const STIFFNESS: Self = Self::new([1, 0, -2, 0]);
+    /// N s/m
     pub(crate) const DAMPING: Self = Self::new([1, 0, -1, 0]);
+    /// m/s
     pub(crate) const VELOCITY: Self = Self::new([0, 1, -1, 0]);
+    /// 1/s, an angular rate.
     pub(crate) const RATE: Self = Self::new([0, 0, -1, 0]);
+    /// 1/s^2
     pub(crate) const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0]);
 
+    /// A dimension from the single exponents of kg, m, s, A.
     pub(crate) const fn new(single: [i32; 4]) -> Self {
         Self([2 * single[0], 2 * single[1], 2 * single[2], 2 * single[3]])
     }
 
+    /// The dimension of a product.
     pub(crate) fn multiplied_by(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| {
             self.0[i].saturating_add(other.0[i])
         }))
     }
 
+    /// The dimension of a quotient.
     pub(crate) fn divided_by(self, other: Self) -> Self {
         Self(std::array::from_fn(|i| {
             self.0[i].saturating_sub(other.0[i])
         }))
     }
 
+    /// The dimension of an integer power.
     pub(crate) fn power(self, exponent: i32) -> Self {
         Self(self.0.map(|one| one.saturating_mul(exponent)))
     }
 
-    /// The square root, if the doubled exponents allow it.
+    /// The dimension of the square root; `None` if an exponent would not be a multiple of one half.
+    /// An odd doubled exponent would need quarters of exponents.
     pub(crate) fn square_root(self) -> Option<Self> {
         self.0
             .iter()
@@ -119,7 +138,8 @@ impl UnitDimension {
             .then(|| Self(self.0.map(|one| one / 2)))
     }
 
-    /// What people call it, with its unit: `a length (m)`.
+    /// Its common name with its unit: `a length (m)`.
+    /// Dimensions without a common name are printed as powers.
     pub(crate) fn describe(self) -> String {
         PRINTED
             .iter()
@@ -137,6 +157,7 @@ impl UnitDimension {
     }
 }
 
+/// Prints the common unit, or powers of the base units.
 impl std::fmt::Display for UnitDimension {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some((unit, _, _)) = PRINTED
@@ -146,6 +167,7 @@ impl std::fmt::Display for UnitDimension {
             return f.write_str(unit);
         }
         let mut blank = "";
+        // One factor per base unit, exponents of one half as fractions.
         for (name, twice) in ["kg", "m", "s", "A"].iter().zip(self.0) {
             if twice == 0 {
                 continue;
@@ -165,19 +187,23 @@ impl std::fmt::Display for UnitDimension {
 /// A unit of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct ModelUnit {
-    /// As the author wrote it, blanks tidied.
+    /// As the author wrote it, with single blanks.
     pub(crate) text: String,
+    /// Its dimension, for checks of expressions.
     pub(crate) dimension: UnitDimension,
 }
 
 impl ModelUnit {
-    /// A unit by its text, such as `N s/m`, which stands at `span` and, as far as it is known, begins at `inner` there.
+    /// Parses a unit such as `N s/m`. It stands at `span`; its text begins at byte `inner`, if that is known.
+    ///
+    /// A fault goes to the log and gives `None`.
     pub(crate) fn from_text(
         text: &str,
         span: SourceSpan,
         inner: Option<usize>,
         log: &mut DiagnosticLog,
     ) -> Option<Self> {
+        // The fault has the part of the text that is wrong.
         let fault = match parse_unit(text) {
             Ok(dimension) => {
                 return Some(Self {
@@ -187,6 +213,7 @@ impl ModelUnit {
             }
             Err(fault) => fault,
         };
+        // The mark covers only the faulty part if the position of the text is known.
         let place = inner.map_or(span, |inner| SourceSpan {
             file: span.file,
             start: inner + fault.start,
@@ -196,6 +223,7 @@ impl ModelUnit {
         let mut diagnostic = Diagnostic::error(place, fault.message).label(
             "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
         );
+        // Prefixed units are refused, because no factor is ever applied.
         if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
             diagnostic = diagnostic.help(format!(
                 "write `{si}` and convert the value; modelmill uses SI units without prefixes"
@@ -207,7 +235,7 @@ impl ModelUnit {
         None
     }
 
-    /// True for an angle, which may stand in sines and cosines.
+    /// True for an angle, which may be the operand of sines and cosines.
     pub(crate) fn is_angle(&self) -> bool {
         self.text == "rad"
     }
@@ -242,7 +270,8 @@ impl schemars::JsonSchema for ModelUnit {
 
 /// Unit of a product of powers of quantities: `kg m` for a mass times a length.
 ///
-/// A single quantity keeps its unit as the file writes it; what is no unit counts as a pure number.
+/// A single quantity keeps its unit as the file writes it. A text that is not a unit counts as a pure number.
+/// A single unit keeps its spelling, such as `N m s/rad`.
 pub fn unit_product(factors: &[(&str, i32)]) -> String {
     if let [(unit, 1)] = factors {
         return (*unit).to_owned();
@@ -254,14 +283,17 @@ pub fn unit_product(factors: &[(&str, i32)]) -> String {
     product.to_string()
 }
 
-/// A stretch of the unit's text that has no meaning.
+/// A segment of the unit's text that is not valid.
 struct UnitFault {
+    /// First byte in the text of the unit.
     start: usize,
+    /// One past the last byte.
     end: usize,
+    /// What is wrong, for the title of the diagnostic.
     message: String,
 }
 
-/// Products by blanks or `*`; after one `/` comes a single unit or a bracket.
+/// The dimension of a unit: factors separated by blanks or `*`; after one `/` a single unit or a bracket.
 fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     let whole = |message: &str| UnitFault {
         start: 0,
@@ -274,6 +306,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     if text.trim().is_empty() {
         return Err(whole("this unit is empty"));
     }
+    // At most one `/` is allowed.
     let (above, below) = match text.split_once('/') {
         Some((above, below)) => (above, Some(below)),
         None => (text, None),
@@ -281,6 +314,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     let mut dimension = factors(above, 0)?.0;
     if let Some(below) = below {
         let offset = above.len() + 1;
+        // A bracket counts as one divisor.
         let trimmed = below.trim();
         let bracket = trimmed
             .strip_prefix('(')
@@ -291,11 +325,12 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
         } else {
             factors(below, offset)?
         };
+        // `N/m s` could mean `N/(m s)` or `(N/m) s`.
         if n_factors != 1 {
             return Err(UnitFault {
                 start: offset,
                 end: text.len(),
-                message: "it is not clear what this unit divides by".to_owned(),
+                message: "this unit has an ambiguous divisor".to_owned(),
             });
         }
         dimension = dimension.divided_by(divisor);
@@ -303,7 +338,10 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
     Ok(dimension)
 }
 
+/// The product of units separated by blanks, `*` or a middle dot, and their number.
+/// `offset` is the position of `text` in the complete unit, for the places of faults.
 fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFault> {
+    // Units are separated by blanks or product signs.
     let mut dimension = UnitDimension::ONE;
     let mut n_factors = 0;
     let mut at = 0;
@@ -321,6 +359,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
             .find(|found: char| found.is_whitespace() || found == '*' || found == '\u{b7}')
             .unwrap_or(rest.len());
         let word = &rest[..end];
+        // A unit may have an integer exponent, up to nine.
         let (name, exponent) = match word.split_once('^') {
             Some((name, exponent)) => (name, exponent.parse::<i32>().ok()),
             None => (word, Some(1)),
@@ -343,6 +382,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
         n_factors += 1;
         at += end;
     }
+    // A missing unit is reported at its position.
     if n_factors == 0 {
         return Err(UnitFault {
             start: offset,

@@ -1,4 +1,6 @@
 //! The small values of a model file: names, texts, numbers, vectors, and the words for an axis.
+//!
+//! Each type reads itself from a node of the document and reports faults with its place.
 
 #[cfg(any(test, feature = "schema"))]
 use std::borrow::Cow;
@@ -14,7 +16,7 @@ use crate::schema::{SearchRangeEntry, UnitTable};
 use crate::unit::ModelUnit;
 use crate::words::words;
 
-/// Words that mean something in expressions and so name nothing else.
+/// Words with a meaning in expressions, which therefore cannot be names.
 const RESERVED: [&str; 17] = [
     "pi",
     "sin",
@@ -38,7 +40,9 @@ const RESERVED: [&str; 17] = [
 /// A name, where it is defined or where it is used.
 #[derive(Clone, Debug)]
 pub(crate) struct SpannedName {
+    /// The name, checked to be an identifier.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -46,6 +50,7 @@ impl SchemaValue for SpannedName {
     const EXPECTED: &'static str = "a name in quotes";
     const EXAMPLE: &'static str = "\"S1\"";
 
+    // Text that is not an identifier is reported and not read.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
@@ -57,7 +62,9 @@ impl SchemaValue for SpannedName {
     }
 }
 
-/// Whether a text is an identifier.
+/// Whether a text is an identifier: a letter, then letters, digits and `_`, at most 60 characters.
+///
+/// Generated code uses names of models, so they must be identifiers there.
 pub(crate) fn is_name(text: &str) -> bool {
     text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
@@ -66,7 +73,7 @@ pub(crate) fn is_name(text: &str) -> bool {
             .all(|found| found.is_ascii_alphanumeric() || found == '_')
 }
 
-/// Reports a name that is no identifier.
+/// Reports a name that is not an identifier; true if it is one.
 pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let fine = is_name(text);
     if !fine {
@@ -78,7 +85,9 @@ pub(crate) fn check_name(text: &str, span: SourceSpan, log: &mut DiagnosticLog) 
     fine
 }
 
-/// Reports a name that is taken by the language of expressions.
+/// Reports a name that is a word of the expression language; true if it is not one.
+///
+/// These are functions, quantities of a place, `base`, and the time `t`.
 pub(crate) fn check_not_reserved(text: &str, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     let reserved = RESERVED.contains(&text);
     if reserved {
@@ -110,7 +119,9 @@ impl JsonSchema for SpannedName {
 /// Free text.
 #[derive(Clone, Debug)]
 pub(crate) struct SpannedText {
+    /// The text without its quotes; at most 4000 bytes.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -118,10 +129,12 @@ impl SchemaValue for SpannedText {
     const EXPECTED: &'static str = "a text in quotes";
     const EXAMPLE: &'static str = "\"...\"";
 
+    // Titles, notes and paths are such texts.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let TomlValue::Text { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Notes are printed on pages and in messages, so their length is limited.
         if text.len() > 4000 {
             log.push(
                 Diagnostic::error(node.span, "this text is too long")
@@ -154,7 +167,9 @@ impl JsonSchema for SpannedText {
 /// A finite number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SpannedNumber {
+    /// The value in SI units.
     pub(crate) value: f64,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -166,6 +181,7 @@ impl SchemaValue for SpannedNumber {
         let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // TOML has `inf` and `nan`, which no quantity of a mechanism may be.
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Some(Self {
                 value,
@@ -175,7 +191,7 @@ impl SchemaValue for SpannedNumber {
                 log.push(
                     Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
                         .label("expected a finite number")
-                        .help("nothing in a mechanism is infinite; leave the entry away if it is not known"),
+                        .help("quantities of a mechanism are finite; omit the entry if its value is not known"),
                 );
                 None
             }
@@ -198,7 +214,7 @@ impl JsonSchema for SpannedNumber {
     }
 }
 
-/// Yes or no.
+/// A boolean.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BooleanFlag(pub(crate) bool);
 
@@ -229,13 +245,17 @@ impl JsonSchema for BooleanFlag {
     }
 }
 
-/// A unit that may depend on what the place carries.
+/// A unit that may depend on the load of the place: force, torque or mass.
 #[derive(Clone, Debug)]
+// `None` where the author gives no unit: the kind does not act at such places.
 pub(crate) struct UnitByPlace {
+    /// Where the place carries a force.
     pub(crate) force: Option<ModelUnit>,
+    /// Where the place carries a torque.
     pub(crate) torque: Option<ModelUnit>,
+    /// At a point, which carries a mass.
     pub(crate) point: Option<ModelUnit>,
-    /// Elsewhere: one unit for all places serves there.
+    /// At all other places; only a single unit for all places applies there.
     pub(crate) elsewhere: Option<ModelUnit>,
 }
 
@@ -244,6 +264,7 @@ impl SchemaValue for UnitByPlace {
     const EXAMPLE: &'static str = "{ force = \"N\", torque = \"N m\" }";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // One unit serves all places.
         match &node.value {
             TomlValue::Text { .. } => {
                 let unit = ModelUnit::read(node, log)?;
@@ -254,6 +275,7 @@ impl SchemaValue for UnitByPlace {
                     elsewhere: Some(unit),
                 })
             }
+            // Units by place leave other places without a unit.
             TomlValue::Table(table) => {
                 let table = UnitTable::from_table(table, node.span, log);
                 Some(Self {
@@ -285,7 +307,7 @@ impl JsonSchema for UnitByPlace {
     }
 }
 
-/// The version of the file format.
+/// The version of the file format; only 1 exists.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SchemaVersion;
 
@@ -297,6 +319,7 @@ impl SchemaValue for SchemaVersion {
         let TomlValue::Number { text, .. } = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Another version is reported, and reading continues with the rules of this one.
         if text != "1" {
             log.push(
                 Diagnostic::error(
@@ -327,10 +350,13 @@ impl JsonSchema for SchemaVersion {
 }
 
 /// Three expressions, or two in the x-y plane.
+///
+/// In the x-y plane the third entry is zero.
 #[derive(Clone, Debug)]
 pub(crate) struct FormulaVector {
     /// The entries; absent where one was faulty.
     pub(crate) entries: Vec<Option<SourceFormula>>,
+    /// Where the vector stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -342,6 +368,7 @@ impl SchemaValue for FormulaVector {
         let TomlValue::Array(array) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
+        // Other lengths are refused, because it is unclear which entry is missing.
         if !(2..=3).contains(&array.len()) {
             log.push(
                 Diagnostic::error(
@@ -356,6 +383,7 @@ impl SchemaValue for FormulaVector {
             );
             return None;
         }
+        // A faulty entry is `None`; its fault is reported by the reader of expressions.
         Some(Self {
             entries: array
                 .iter()
@@ -374,7 +402,7 @@ impl JsonSchema for FormulaVector {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         json_schema!({
-            "description": "x, y and z; z may be left away.",
+            "description": "x, y and z; z may be omitted.",
             "type": "array",
             "items": generator.subschema_for::<SourceFormula>(),
             "minItems": 2,
@@ -383,7 +411,7 @@ impl JsonSchema for FormulaVector {
     }
 }
 
-/// A place of a lumped mass.
+/// The place of a lumped mass.
 #[derive(Clone, Debug)]
 pub(crate) enum LumpedMassPlace {
     /// A named point.
@@ -392,7 +420,9 @@ pub(crate) enum LumpedMassPlace {
     Vector(FormulaVector),
 }
 
+// Both forms know their place.
 impl LumpedMassPlace {
+    /// Where it stands in the file.
     pub(crate) fn span(&self) -> SourceSpan {
         match self {
             Self::Point(name) => name.span,
@@ -405,6 +435,7 @@ impl SchemaValue for LumpedMassPlace {
     const EXPECTED: &'static str = "the name of a point, or a vector";
     const EXAMPLE: &'static str = "\"R3m\"";
 
+    // A text is the name of a point, a list is a position.
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         match &node.value {
             TomlValue::Text { .. } => SpannedName::read(node, log).map(Self::Point),
@@ -434,7 +465,9 @@ impl JsonSchema for LumpedMassPlace {
 /// The end of a parameter's name, such as `1` in `M1`.
 #[derive(Clone, Debug)]
 pub(crate) struct NameSuffix {
+    /// The suffix: letters, digits and `_`, at most 40; it may be empty.
     pub(crate) text: String,
+    /// Where it stands.
     pub(crate) span: SourceSpan,
 }
 
@@ -443,6 +476,7 @@ impl SchemaValue for NameSuffix {
     const EXAMPLE: &'static str = "\"1\"";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // Numbers are allowed, because suffixes are often indices.
         let (TomlValue::Text { text, .. }
         | TomlValue::Number {
             text,
@@ -451,6 +485,7 @@ impl SchemaValue for NameSuffix {
         else {
             return wrong_type::<Self>(node, log);
         };
+        // The suffix may start with a digit, unlike a name.
         let fine = text.len() <= 40
             && text
                 .chars()
@@ -483,30 +518,33 @@ impl JsonSchema for NameSuffix {
     }
 }
 
+// The direction of an axis of a joint; a minus sign reverses it.
 words! {
     /// An axis with its direction.
     pub(crate) AxisName: "an axis",
     "x" => X, "y" => Y, "z" => Z, "-x" => MinusX, "-y" => MinusY, "-z" => MinusZ
 }
 
+// The scalar part w comes last or first.
 words! {
     /// The order in which a quaternion is written.
     pub(crate) QuaternionOrder: "the order of a quaternion",
     "xyzw" => Xyzw, "wxyz" => Wxyz
 }
 
+// The axes of velocity and force, and of angular velocity and moment.
 words! {
     /// The axes of the twist of a free body.
     pub(crate) TwistName: "the axes of a twist",
     "body" => Body, "world" => World, "mixed" => Mixed
 }
 
-/// How a constant's value is found where it is not known.
+/// How the value of an unknown constant is found.
 #[derive(Clone, Debug)]
 pub(crate) enum SearchEntry {
     /// The expression is affine in it.
     Linear,
-    /// Values of a range are tried.
+    /// A grid of values in a range is tried.
     Range(SearchRangeEntry),
 }
 
@@ -515,10 +553,12 @@ impl SchemaValue for SearchEntry {
     const EXAMPLE: &'static str = "{ from = 0.01, to = 1, of = \"rate\" }";
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
+        // The word `linear`, or a table with a range.
         match &node.value {
             TomlValue::Text { text, .. } if text == "linear" => Some(Self::Linear),
             TomlValue::Table(table) => {
                 let range = SearchRangeEntry::from_table(table, node.span, log);
+                // Both bounds must be present to be compared.
                 if let (Some(from), Some(to)) = (range.from, range.to)
                     && from.value >= to.value
                 {

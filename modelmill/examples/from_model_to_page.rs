@@ -1,5 +1,5 @@
-//! From a model file and two recordings to the effect that the model lacks, the completed model file, and a page that shows
-//! it all: `cargo run --release -p modelmill --example from_model_to_page`.
+//! Finds the effect that a model lacks, from a model file and two recordings, and writes the completed model file and
+//! a page with the findings: `cargo run --release -p modelmill --example from_model_to_page`.
 
 use std::path::Path;
 
@@ -26,8 +26,12 @@ fn main() -> Outcome {
         recordings.join("with-rods-check.csv"),
         &RecordingOptions::default(),
     )?;
+    // Identification of the model as it is, for comparison.
     let before = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
-    println!("identified: {:.2} % off on the check run", percent(&before));
+    println!(
+        "identified: error {:.2} % on the validation run",
+        percent(&before)
+    );
 
     let findings = model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())?;
     for missing in &findings.missing {
@@ -38,9 +42,13 @@ fn main() -> Outcome {
         );
     }
 
+    // The completed model is derived again and fitted to the same recordings.
     let better = model.with_added_effects(&findings.entries)?;
     let after = better.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
-    println!("with it: {:.2e} % off on the check run", percent(&after));
+    println!(
+        "with the effect: error {:.2e} % on the validation run",
+        percent(&after)
+    );
 
     let folder = std::env::temp_dir();
     let write = |name: &str, text: &str| {
@@ -56,7 +64,7 @@ fn main() -> Outcome {
     )
 }
 
-/// The error on the check run relative to the measured forces, per cent.
+/// The error on the validation run relative to the measured forces, per cent.
 fn percent(found: &modelmill::identify::Identification) -> f64 {
     let nrms = found.fit.check.as_ref().and_then(|check| check.nrms);
     100.0 * nrms.unwrap_or(f64::NAN)

@@ -8,7 +8,9 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
-/// The model's forces along a recording for given base parameters, `[drive][sample]`, of every sample.
+/// The model's forces along a segment for given base parameters, `[drive][sample]`, N or N m, not decimated.
+///
+/// Fails when a pose has no solution.
 pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     columns(model, data, |states| {
@@ -16,7 +18,10 @@ pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome
     })
 }
 
-/// Determined components of the reactions along a recording for nominal parameters, `[component][sample]`, decimated.
+/// Determined components of the reactions along a segment for nominal parameters, `[component][sample]`, N or N m,
+/// decimated.
+///
+/// Fails when a pose has no solution, or the segment is too short to be filtered.
 pub fn reactions(
     model: &Model,
     data: &RecordingSegment,
@@ -27,13 +32,17 @@ pub fn reactions(
     filter_and_decimate(columns, data)
 }
 
-/// The measured forces, `[drive][sample]`, decimated.
+/// The measured forces, `[drive][sample]`, N or N m, decimated.
+///
+/// Fails when the recording has no forces, or the segment is too short to be filtered.
 pub fn measured_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     filter_and_decimate(data.run.measured_forces()?.to_vec(), data)
 }
 
-/// The measured forces without those that do not count, `[drive][sample]`, decimated; [`crate::stretch::Stretch`] leaves the same
-/// rows of a regressor empty, so that both sides of each equation stay alike whatever filter they pass.
+/// The measured forces with excluded samples set to zero, `[drive][sample]`, decimated. Rows of the regressor are set
+/// to zero at the same samples, so that both sides of each equation stay consistent after any filter.
+///
+/// Fails as [`measured_forces`] does.
 pub fn included_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let mut forces = data.run.measured_forces()?.to_vec();
     for (force, out) in forces.iter_mut().zip(&data.run.left_out) {
@@ -44,7 +53,7 @@ pub fn included_forces(data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     filter_and_decimate(forces, data)
 }
 
-/// `[sample * n_drives + drive]`.
+/// Channels interleaved per sample: `[sample * n_drives + drive]`.
 pub fn interleave(channels: &[Vec<f64>]) -> Vec<f64> {
     let samples = channels.first().map_or(0, Vec::len);
     (0..samples)
@@ -52,16 +61,20 @@ pub fn interleave(channels: &[Vec<f64>]) -> Vec<f64> {
         .collect()
 }
 
-/// Variables on which an error may depend, decimated like the forces: coordinates and their
-/// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads.
+/// Variables on which an error may depend, with their names, decimated like the forces: coordinates and their
+/// derivatives, passive coordinates, lengths and rates of linear drives, and measured loads; SI units.
+///
+/// Fails when a pose has no solution.
 pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String, Vec<f64>)>> {
     let run = &data.run;
     let mut variables = Vec::new();
+    // Active coordinates come from the recording with their derivatives.
     for (i, name) in model.active_coordinates().into_iter().enumerate() {
         variables.push((format!("{name}_d"), run.qd[i].clone()));
         variables.push((format!("{name}_dd"), run.qdd[i].clone()));
         variables.push((name, run.q[i].clone()));
     }
+    // Passive coordinates and their rates are computed by loop closure.
     let evaluator = ModelEvaluator::new(&model.derivation);
     let passive = model.passive_coordinates();
     if !passive.is_empty() {
@@ -70,6 +83,7 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
         variables.extend(passive.iter().cloned().zip(columns.by_ref()));
         variables.extend(passive.iter().map(|name| format!("{name}_d")).zip(columns));
     }
+    // Linear drives act along a length that is no coordinate.
     let mechanism = &model.derivation.mechanism;
     let n_drives = mechanism.drives.len();
     if mechanism
@@ -88,12 +102,12 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
             }
         }
     }
-    // A force by the name of its column in the recording is the load.
+    // A variable with the name of a drive is its measured force, the load.
     for (drive, force) in mechanism.drives.iter().zip(run.force.iter().flatten()) {
         variables.push((drive.name.clone(), force.clone()));
     }
     let (names, columns): (Vec<String>, Vec<Vec<f64>>) = variables.into_iter().unzip();
-    // Variables only say where: every n-th value will do, and keeps signs and ends as they are.
+    // Variables only locate errors: every n-th value suffices, and keeps signs and ends unchanged.
     let factor = data.decimation();
     let picked = columns
         .into_iter()
@@ -101,7 +115,9 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
     Ok(names.into_iter().zip(picked).collect())
 }
 
-/// Columns of numbers along a recording, evaluated block by block.
+/// Columns of numbers along a segment, evaluated block by block: `[column][sample]`.
+///
+/// Fails at the first pose without a solution, and at the first value that is not finite.
 pub fn columns(
     model: &Model,
     data: &RecordingSegment,
@@ -129,7 +145,7 @@ pub fn columns(
     Ok(columns)
 }
 
-/// Columns without numbers that are infinite or none, as values too large to be multiplied make them.
+/// Rejects infinite values and NaN, such as products of values that are too large.
 fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
     let first = block
         .iter()
@@ -143,7 +159,9 @@ fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
     }
 }
 
-/// The parallel filter, on every column; one of zeros stays one.
+/// Low-pass filters and decimates every column by the factor of the recording; a column of zeros stays zero.
+///
+/// Fails when a column is too short for the filter.
 pub fn filter_and_decimate(
     columns: Vec<Vec<f64>>,
     data: &RecordingSegment,
@@ -152,6 +170,7 @@ pub fn filter_and_decimate(
     if factor == 1 {
         return Ok(columns);
     }
+    // Zero columns are only thinned: filtering them would take time and add rounding.
     let is_zero = |column: &[f64]| column.iter().all(|x| *x == 0.0);
     let moving: Vec<&[f64]> = columns
         .iter()
@@ -174,7 +193,7 @@ pub fn filter_and_decimate(
         .collect())
 }
 
-/// Up to which frequency the parallel filter passes forces, Hz.
+/// The highest frequency that the filter of the decimation passes, Hz.
 pub fn decimation_passband(data: &RecordingSegment) -> f64 {
     let time = &data.run.time;
     let rate = match time.as_slice() {
@@ -184,12 +203,14 @@ pub fn decimation_passband(data: &RecordingSegment) -> f64 {
     DECIMATION_PASSBAND * rate / data.decimation() as f64
 }
 
-/// Rates of the drives, `[drive][sample]`, before decimation: from the drives' Jacobian, since a drive may act along a rod
-/// or on a passive coordinate.
+/// Rates of the drives, `[drive][sample]`, rad/s or m/s, not decimated. They are computed from the drives' Jacobian,
+/// since a drive may act along a rod or on a passive coordinate.
+///
+/// Fails when a pose has no solution.
 pub fn drive_rates(model: &Model, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mut positions = columns(model, data, |states| evaluator.drive_motion(states))?;
-    // Positions come first, rates behind them, the Jacobian last.
+    // Columns are ordered: positions, rates, Jacobian.
     let mut rates = positions.split_off(model.derivation.mechanism.drives.len());
     rates.truncate(positions.len());
     Ok(rates)

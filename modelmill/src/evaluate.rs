@@ -1,4 +1,4 @@
-//! `evaluate`: a model's forces along a recording, of the drives or in the joints.
+//! `evaluate`: a model's forces along a recording, at its drives or in its joints.
 
 use std::path::Path;
 
@@ -13,19 +13,19 @@ use crate::text::csv::csv;
 /// Columns of numbers along a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordingEvaluation {
-    /// Times of the samples that are kept, s.
+    /// Times of the samples after decimation, s.
     pub time: Vec<f64>,
     /// Names and values of the columns, N or N m.
     pub columns: Vec<(String, Vec<f64>)>,
-    /// Components that equations of motion do not determine, since the mechanism is held there more often than once.
+    /// Components that the equations of motion do not determine, since the mechanism is statically indeterminate there.
     pub left_out: Vec<String>,
 }
 
 impl Model {
-    /// The model's forces along a recording, one column for each drive, when they act: without a delay of their reading.
-    /// `values` are those of the base parameters.
+    /// The model's forces along a recording, one column for each drive, at the time at which they act: without the
+    /// delay of the model's `time_delay`. `values` are those of the base parameters.
     ///
-    /// Fails when the recording lacks a position, or leads where the mechanism cannot stand.
+    /// Fails when the recording lacks a position, or contains a pose that the mechanism cannot reach.
     pub fn evaluate(
         &self,
         path: impl AsRef<Path>,
@@ -43,8 +43,8 @@ impl Model {
         Ok(found)
     }
 
-    /// What the joints and the cuts of loops transmit along a recording, for the parameters of the model file: one column for
-    /// each component that is determined.
+    /// Forces and moments that the joints and the cuts of loops transmit along a recording, for the parameters of the
+    /// model file: one column for each component that is determined.
     ///
     /// Fails as [`Model::evaluate`] does.
     pub fn evaluate_reactions(
@@ -67,6 +67,7 @@ impl Model {
 }
 
 impl RecordingEvaluation {
+    /// Named columns without samples yet.
     fn new(names: Vec<String>, left_out: Vec<String>) -> Self {
         Self {
             time: Vec::new(),
@@ -75,6 +76,7 @@ impl RecordingEvaluation {
         }
     }
 
+    /// Appends the samples of one segment.
     fn extend(&mut self, time: &[f64], columns: Vec<Vec<f64>>) {
         self.time.extend(time);
         for ((_, whole), more) in self.columns.iter_mut().zip(columns) {
@@ -91,13 +93,15 @@ impl RecordingEvaluation {
     }
 }
 
-/// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and of a loop `closure.Fx`.
+/// Names of the components of all reactions, such as `elbow.Fx`, `elbow.Mz`, and `closure.Fx` of a loop.
 pub(crate) struct ReactionComponents {
-    /// Those that equations of motion determine, in the order of the program's outputs.
+    /// Components that the equations of motion determine, in the order of the program's outputs.
     pub(crate) determined: Vec<String>,
+    /// Statically indeterminate components.
     pub(crate) left_out: Vec<String>,
 }
 
+/// The names of all components, in the order in which the program returns them.
 pub(crate) fn reaction_components(reactions: &ReactionPrograms) -> ReactionComponents {
     let mut found = ReactionComponents {
         determined: Vec::new(),

@@ -1,4 +1,4 @@
-//! Progress and cancellation: whoever starts a verb hears what goes on, and may stop it.
+//! Progress and cancellation: the caller of a method receives the name and progress of each job, and can stop it.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -8,58 +8,59 @@ use modelmill_identify::RecordingNote;
 
 use crate::error::{Error, Outcome};
 
-/// What a caller wants to hear while a verb works. All methods do nothing unless they are written.
+/// Receives progress and notes of a method. All methods have empty default implementations.
 pub trait ProgressListener: Send + Sync {
-    /// A job begins. `total` counts its steps; 0 if nobody knows how many there are. `job` lives until the job ends, so
-    /// that a watcher may look at it whenever it likes.
+    /// A job starts. `what` is its name, `total` its number of steps, 0 if that is unknown. `job` lives until the job
+    /// ends, so that a listener may read it at any time.
     fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let _ = (what, total, job);
     }
 
-    /// The last job that began ends, whether it succeeded or not.
+    /// The job that started last has ended, with or without success.
     fn on_job_end(&self) {}
 
-    /// A remark that comes up on the way. The verb's result holds it as well.
+    /// A note was issued. The result of the method contains it as well.
     fn on_note(&self, note: &RecordingNote) {
         let _ = note;
     }
 }
 
-/// Nobody listens.
+/// A listener that ignores everything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SilentProgress;
 
 impl ProgressListener for SilentProgress {}
 
-/// A job that goes on: how far it has come, and whether it is to stop.
+/// A running job: its progress, and whether it has been cancelled. Shared between the job and its listener.
 #[derive(Debug, Default)]
 pub struct JobHandle {
+    /// Finished steps.
     done: AtomicU64,
     is_cancelled: AtomicBool,
 }
 
 impl JobHandle {
-    /// Steps that are done.
+    /// Number of finished steps.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
     }
 
-    /// Asks the job to stop; it ends with [`Error::Cancelled`] at its next step.
+    /// Requests the job to stop; it ends with [`Error::Cancelled`] at its next step.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether somebody asked the job to stop.
+    /// Whether the job has been requested to stop.
     pub fn is_cancelled(&self) -> bool {
         self.is_cancelled.load(Ordering::Relaxed)
     }
 
-    /// Counts some more steps.
+    /// Adds finished steps.
     pub fn add(&self, steps: usize) {
         self.done.fetch_add(steps as u64, Ordering::Relaxed);
     }
 
-    /// Counts some more steps, and says whether to go on.
+    /// Adds finished steps, and returns whether to continue.
     pub fn flow(&self, steps: usize) -> ControlFlow<()> {
         match self.step(steps) {
             Ok(()) => ControlFlow::Continue(()),
@@ -67,9 +68,9 @@ impl JobHandle {
         }
     }
 
-    /// Counts some more steps.
+    /// Adds finished steps.
     ///
-    /// Fails with [`Error::Cancelled`] once somebody asked the job to stop.
+    /// Fails with [`Error::Cancelled`] once the job has been requested to stop.
     pub fn step(&self, steps: usize) -> Outcome {
         self.add(steps);
         if self.is_cancelled() {
@@ -79,7 +80,7 @@ impl JobHandle {
     }
 }
 
-/// Ends a job when it goes out of scope, also by an early return.
+/// Reports the end of a job when it goes out of scope, also after an early return or a panic.
 struct JobGuard<'a>(&'a dyn ProgressListener);
 
 impl Drop for JobGuard<'_> {
@@ -88,9 +89,9 @@ impl Drop for JobGuard<'_> {
     }
 }
 
-/// Runs a job while `progress` watches it.
+/// Runs a job that `progress` observes.
 ///
-/// Fails with [`Error::Cancelled`] if somebody asked it to stop, whatever it found until then.
+/// Fails with [`Error::Cancelled`] if the job was requested to stop, even if it has a result.
 pub(crate) fn run_job<T>(
     progress: &dyn ProgressListener,
     what: &str,
@@ -100,6 +101,7 @@ pub(crate) fn run_job<T>(
     let job = Arc::new(JobHandle::default());
     progress.on_job_start(what, total, &job);
     let ending = JobGuard(progress);
+    // A listener may cancel the job as soon as it starts.
     if job.is_cancelled() {
         return Err(Error::Cancelled);
     }

@@ -1,4 +1,4 @@
-//! Columns of a regressor along recordings, one after the other, each channel decimated alike.
+//! Columns of a regressor along several recordings, joined in their order; every drive is decimated alike.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::ForceColumn;
@@ -8,10 +8,12 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
-/// Recordings, each with whether it is one of the check.
+/// Segments, each with whether it belongs to the validation runs.
 pub(crate) type SegmentList<'a> = [(&'a RecordingSegment, bool)];
 
-/// Columns of a regressor along all recordings.
+/// Columns of a regressor along all segments: `[column][drive][sample]`, zero columns empty.
+///
+/// Fails when a pose has no solution, or a segment is too short to be filtered.
 pub(crate) fn regressor(
     all: &SegmentList<'_>,
     evaluator: &ModelEvaluator<'_>,
@@ -20,7 +22,9 @@ pub(crate) fn regressor(
     regressor_of(all, evaluator, model, &|_| true)
 }
 
-/// The same of some columns only; the others are zero.
+/// As [`regressor`], for the columns that `wanted` selects; the others are zero.
+///
+/// Fails as [`regressor`] does.
 pub(crate) fn regressor_of(
     all: &SegmentList<'_>,
     evaluator: &ModelEvaluator<'_>,
@@ -30,13 +34,14 @@ pub(crate) fn regressor_of(
     let n_drives = model.drives().len();
     let mut stacked: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
+    // Each segment is filtered alone; a column that is zero up to here has no values yet.
     for (one, _) in all {
         let columns = nonzero_columns(one, evaluator, model, wanted)?;
         stacked.resize(columns.len(), None);
         let (slots, mut columns): (Vec<_>, Vec<_>) = (stacked.iter_mut().zip(columns))
             .filter_map(|(slot, column)| Some((slot, column?)))
             .unzip();
-        // A column without a finite value somewhere has none at all once it is filtered.
+        // One value that is not finite spoils a filtered column; the complete segment is marked NaN.
         let mut is_none = vec![false; columns.len()];
         for (column, is_none) in columns.iter_mut().zip(&mut is_none) {
             if column.iter().any(|x| !x.is_finite()) {
@@ -51,13 +56,14 @@ pub(crate) fn regressor_of(
             }
             slot.get_or_insert_with(|| vec![0.0; before]).extend(column);
         }
+        // Columns that are zero along this segment are extended by zeros.
         before += one.samples().div_ceil(one.decimation());
         for column in stacked.iter_mut().flatten() {
             column.resize(before, 0.0);
         }
     }
     let n = stacked.len() / n_drives.max(1);
-    // Drives are outermost.
+    // The evaluator returns drives outermost, columns within each drive.
     let mut by_column = vec![ForceColumn::default(); n];
     for (k, values) in stacked.into_iter().enumerate() {
         by_column[k % n].0.push(values);
@@ -65,7 +71,9 @@ pub(crate) fn regressor_of(
     Ok(by_column)
 }
 
-/// Columns along one recording, drive by drive; `None` where they are zero throughout, as most are on most drives.
+/// Columns along one segment, drive by drive; `None` where a column is zero throughout, as most are on most drives.
+///
+/// Fails when the mechanism cannot reach a pose.
 fn nonzero_columns(
     one: &RecordingSegment,
     evaluator: &ModelEvaluator<'_>,
@@ -75,7 +83,7 @@ fn nonzero_columns(
     let mut columns: Vec<Option<Vec<f64>>> = Vec::new();
     let mut before = 0;
     let n_drives = model.drives().len().max(1);
-    // Of many columns few may be wanted.
+    // Columns that are not wanted are neither stored nor tested.
     let mut is_wanted: Vec<bool> = Vec::new();
     one.for_each_block(model, |states| {
         Ok::<_, Error>(
@@ -87,6 +95,7 @@ fn nonzero_columns(
                 }
                 let columns = columns.iter_mut().zip(block).zip(&is_wanted);
                 for ((column, values), _) in columns.filter(|(_, is_wanted)| **is_wanted) {
+                    // A column gets memory only at its first value that is not zero.
                     if column.is_none() && values.iter().all(|x| *x == 0.0) {
                         continue;
                     }

@@ -1,4 +1,4 @@
-//! `simulate`: a rig driven along a trajectory, as a recording.
+//! `simulate`: drives a rig along a trajectory and records the readings of its sensors.
 
 use std::path::Path;
 
@@ -14,22 +14,22 @@ use crate::error::{Error, Outcome};
 use crate::host::Host;
 use crate::text::csv::csv;
 
-/// A run of a rig.
+/// A simulated run of a rig.
 pub struct RigSimulation {
     /// The rig's name.
     pub rig: String,
     /// Names of its drives.
     pub drives: Vec<String>,
-    /// What its sensors read: the columns by name, all of one length.
+    /// Readings of its sensors: columns with their names, all of one length.
     pub run: RigRecording,
-    /// The seed of its noise.
+    /// Seed of the noise.
     pub seed: u64,
-    /// Remarks on the trajectory and the run.
+    /// Notes on the trajectory and the run.
     pub notes: Vec<String>,
 }
 
 impl RigSimulation {
-    /// Samples of the run.
+    /// Number of samples.
     pub fn samples(&self) -> usize {
         self.run.columns.first().map_or(0, |(_, time)| time.len())
     }
@@ -45,7 +45,16 @@ impl RigSimulation {
 impl Host {
     /// Reads a rig file.
     ///
-    /// Fails with every finding about it, each with its place.
+    /// Fails with every finding about the file, each with its place.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use modelmill::Host;
+    ///
+    /// let rig = Host::new().rig(Path::new("../model-spec/rigs/spidermill-full.toml"))?.rig;
+    /// assert!(!rig.drives.is_empty());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn rig(&self, path: &Path) -> Outcome<modelmill_rig::LoadedRig> {
         if self.files().kind(path) == PathKind::Folder {
             return Err(Error::input(format!(
@@ -53,6 +62,7 @@ impl Host {
                 path.display()
             )));
         }
+        // A model file in place of a rig file is a common mistake and gets its own message.
         modelmill_rig::load_file_with(path, self.files()).map_err(|failure| {
             if self.load(path).is_ok() {
                 return Error::input(message!(
@@ -66,10 +76,10 @@ impl Host {
         })
     }
 
-    /// Drives a rig along a trajectory, a recording with its coordinates, and records what its sensors read; `columns` are
-    /// pairs of our names and the trajectory's.
+    /// Drives a rig along a trajectory, which is a recording of its coordinates, and records the readings of its
+    /// sensors. `columns` are pairs of a name of the rig and the trajectory's column.
     ///
-    /// Fails when the trajectory lacks a coordinate, or leads where the rig cannot follow.
+    /// Fails when the trajectory lacks a coordinate, or the rig cannot follow it.
     pub fn simulate(
         &self,
         path: &Path,
@@ -85,6 +95,7 @@ impl Host {
         })?;
         let mut notes = Vec::new();
         let trajectory = self::trajectory(&rig, &recording, &mut notes)?;
+        // The number of instants is the total of the progress.
         let steps = modelmill_rig::n_instants(&rig, &trajectory);
         let run = self
             .run_job(&format!("simulating {}", rig.name), steps, |job| {
@@ -102,7 +113,10 @@ impl Host {
     }
 }
 
-/// The columns `t` and, per coordinate, its values and what there is of its derivatives.
+/// The trajectory of a recording: column `t` and, for each coordinate, its positions and those derivatives that are
+/// recorded.
+///
+/// Fails when a column is missing or times do not increase; the message has the line of the file.
 fn trajectory(
     rig: &Rig,
     recording: &SignalRecording,
@@ -115,6 +129,7 @@ fn trajectory(
             Ok(None)
         }
     };
+    // Missing derivatives are computed later by differences, which a note states.
     let mut samples = Vec::new();
     let mut found = Vec::new();
     for coordinate in &rig.coordinates {
@@ -131,12 +146,13 @@ fn trajectory(
     }
     if !found.is_empty() {
         notes.push(format!(
-            "derivatives of {} are differences over five samples: noise or rounding of the positions would show in \
-             the forces; give the columns with _d and _dd where they are known",
+            "derivatives of {} are differences over five samples: noise and rounding of the positions appear in \
+             the forces; add the columns with _d and _dd if they are known",
             found.join(", ")
         ));
     }
     let names: Vec<&str> = rig.coordinates.iter().map(|c| c.name.as_str()).collect();
+    // Faults of the trajectory are reported with their line or column in the file.
     Trajectory::new(recording.column("t")?.to_vec(), samples).map_err(|error| {
         let file = recording.file();
         Error::input(match &error {
@@ -157,7 +173,7 @@ fn trajectory(
     })
 }
 
-/// Why there is no run: with the line of the trajectory where the rig could not follow.
+/// The error of a run that failed, with the line of the trajectory at which the rig could not follow.
 fn refusal(
     rig: &Rig,
     path: &Path,
@@ -174,6 +190,7 @@ fn refusal(
     else {
         return Error::input(format!("{}: {error}", path.display()));
     };
+    // The last sample before the failure is the one to check.
     let after = trajectory.time().partition_point(|t| t <= time);
     let line = recording.line(after.saturating_sub(1)).unwrap_or(0);
     let state = trajectory.state_at(*time);

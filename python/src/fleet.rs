@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use modelmill::recording::{Preparation, Reading};
-use modelmill_fleet::{Fault, Ground, Plan, Summary};
+use modelmill::recording::{RecordingOptions, StatePreparation};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan, FleetSummary};
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -14,11 +14,11 @@ use crate::spelling::PythonSpelling;
 /// A plan with its model derived.
 #[pyclass(frozen)]
 pub(crate) struct FleetGround {
-    ground: Ground,
+    ground: FleetModel,
 }
 
 /// A fault of the library as an exception.
-fn fleet_error(py: Python<'_>, fault: &Fault) -> PyErr {
+fn fleet_error(py: Python<'_>, fault: &FleetFault) -> PyErr {
     input_error(py, &fault.message().spell(&PythonSpelling))
 }
 
@@ -34,19 +34,19 @@ pub(crate) fn fleet_plan(
     decimate: usize,
     skip_bad_samples: bool,
 ) -> PyResult<String> {
-    let reading = Reading {
+    let reading = RecordingOptions {
         columns,
-        preparation: Preparation {
+        preparation: StatePreparation {
             cutoff_hz,
             decimate: decimate.max(1),
-            ..Preparation::default()
+            ..StatePreparation::default()
         },
         skip_bad_samples,
-        ..Reading::default()
+        ..RecordingOptions::default()
     };
     let made = py.detach(|| {
         let reference: Vec<&Path> = reference.iter().map(PathBuf::as_path).collect();
-        Plan::make(&model, &reading, &reference).map(|plan| plan.json())
+        FleetPlan::from_recordings(&model, &reading, &reference).map(|plan| plan.json())
     });
     made.map_err(|fault| fleet_error(py, &fault))
 }
@@ -58,9 +58,9 @@ pub(crate) fn fleet_merge(
     summaries: Vec<Vec<u8>>,
 ) -> PyResult<Option<Bound<'_, PyBytes>>> {
     let merged = py.detach(|| {
-        let mut sum: Option<Summary> = None;
+        let mut sum: Option<FleetSummary> = None;
         for bytes in &summaries {
-            let one = Summary::of_bytes(bytes)?;
+            let one = FleetSummary::from_bytes(bytes)?;
             match &mut sum {
                 None => sum = Some(one),
                 Some(sum) => sum.merge(&one)?,
@@ -76,7 +76,8 @@ pub(crate) fn fleet_merge(
 impl FleetGround {
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
-        let made = py.detach(|| Plan::parse("the plan", plan).and_then(|plan| plan.ground()));
+        let made =
+            py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.derive_model()));
         let ground = made.map_err(|fault| fleet_error(py, &fault))?;
         Ok(Self { ground })
     }
@@ -115,11 +116,11 @@ impl FleetGround {
     /// Parameters with standard deviations, and the number of bad recordings, as JSON.
     fn solve(&self, py: Python<'_>, summary: &[u8]) -> PyResult<String> {
         let solved = py.detach(|| {
-            let summary = Summary::of_bytes(summary)?;
+            let summary = FleetSummary::from_bytes(summary)?;
             let fit = self.ground.solve(&summary)?;
             Ok(self.ground.json(&fit).to_string())
         });
-        solved.map_err(|fault: Fault| fleet_error(py, &fault))
+        solved.map_err(|fault: FleetFault| fleet_error(py, &fault))
     }
 
     /// Changes and dead sensors of a robot, from the summaries of its days in order, as JSON.
@@ -127,11 +128,11 @@ impl FleetGround {
         let found = py.detach(|| {
             let days = days
                 .iter()
-                .map(|(day, bytes)| Ok((day.clone(), Summary::of_bytes(bytes)?)));
-            let days = days.collect::<Result<Vec<_>, Fault>>()?;
-            let robot = modelmill_fleet::robot::robot(&self.ground, name, &days)?;
+                .map(|(day, bytes)| Ok((day.clone(), FleetSummary::from_bytes(bytes)?)));
+            let days = days.collect::<Result<Vec<_>, FleetFault>>()?;
+            let robot = modelmill_fleet::robot::robot_history(&self.ground, name, &days)?;
             Ok(robot.json(&self.ground).to_string())
         });
-        found.map_err(|fault: Fault| fleet_error(py, &fault))
+        found.map_err(|fault: FleetFault| fleet_error(py, &fault))
     }
 }

@@ -25,7 +25,7 @@ mod _core {
     #[pymodule_export]
     use crate::model::{CoreModel, contents, import_text, kinds, load, load_text};
     #[pymodule_export]
-    use crate::results::{PythonExcitation, PythonResult, PythonRecording};
+    use crate::results::{PythonExcitation, PythonRecording, PythonResult};
     #[pymodule_export]
     use crate::rigs::{PythonSimulation, reduce, simulate};
     #[pymodule_export]

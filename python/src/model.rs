@@ -4,28 +4,30 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use modelmill::add::{Said, Setting, new_effect};
-use modelmill::diagnose::{Held, Question};
-use modelmill::generate::{Code, Language};
+use modelmill::add::{EffectSetting, SettingValue, new_effect};
+use modelmill::diagnose::{DiagnosisOptions, FixedParameters};
+use modelmill::generate::{CodeLanguage, CodeOptions};
 use modelmill::identify::Instruments;
-use modelmill::model::{Changes, Format};
-use modelmill::picture::Drawing;
-use modelmill::recording::Recording;
+use modelmill::model::{ModelChanges, PageFormat};
+use modelmill::picture::PictureOptions;
+use modelmill::recording::PreparedRecording;
 use modelmill::report::{page, runs_page};
-use modelmill::runs::Unread;
-use modelmill::states::{Function, Functions, Given};
-use modelmill::text::style::Style;
-use modelmill::variants::Variants;
+use modelmill::runs::UnreadRun;
+use modelmill::states::{ModelFunction, ModelFunctions, StateSamples};
+use modelmill::text::style::TerminalStyle;
+use modelmill::variants::VariantComparison;
 use modelmill::{Error, FitFile, Host, Model, Outcome, export, import, print};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays::state_matrix;
 use crate::errors::input_error;
-use crate::options::{self, EstimationOptions, ExcitationOptions, ReadingOptions, OptionResult};
-use crate::results::{PythonExcitation, PythonResult, PythonRecording, RemarkList, PythonSource, remarks};
+use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult, ReadingOptions};
+use crate::results::{
+    PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks,
+};
 use crate::spelling::PythonSpelling;
-use crate::run_interruptible::{JobListener, run_blocking, run_interruptible};
+use crate::work::{JobListener, run_blocking, run_interruptible};
 
 /// Largest number of states for which a function is computed in this thread, without a check for interrupts.
 const FEW: usize = 256;
@@ -128,7 +130,7 @@ pub(crate) fn import_text(
 #[derive(Clone)]
 pub(crate) struct CoreModel {
     model: Model,
-    functions: Arc<Functions>,
+    functions: Arc<ModelFunctions>,
     listener: Arc<JobListener>,
 }
 
@@ -166,23 +168,23 @@ impl CoreModel {
 }
 
 /// A function by the name of its method.
-fn function_by_name(py: Python<'_>, function: &str) -> PyResult<Function> {
+fn function_by_name(py: Python<'_>, function: &str) -> PyResult<ModelFunction> {
     Ok(match function {
-        "inverse_dynamics" => Function::InverseDynamics,
-        "regressor" => Function::Regressor,
-        "mass_matrix" => Function::MassMatrix,
-        "bias" => Function::Bias,
-        "forward_dynamics" => Function::ForwardDynamics,
-        "reactions" => Function::Reactions,
+        "inverse_dynamics" => ModelFunction::InverseDynamics,
+        "regressor" => ModelFunction::Regressor,
+        "mass_matrix" => ModelFunction::MassMatrix,
+        "bias" => ModelFunction::Bias,
+        "forward_dynamics" => ModelFunction::ForwardDynamics,
+        "reactions" => ModelFunction::Reactions,
         other => return Err(input_error(py, &format!("there is no function `{other}`"))),
     })
 }
 
-fn recordings(all: &[PyRef<'_, PythonRecording>]) -> Vec<Arc<Recording>> {
+fn recordings(all: &[PyRef<'_, PythonRecording>]) -> Vec<Arc<PreparedRecording>> {
     all.iter().map(|one| Arc::clone(&one.recording)).collect()
 }
 
-fn borrow_recordings(all: &[Arc<Recording>]) -> Vec<&Recording> {
+fn borrow_recordings(all: &[Arc<PreparedRecording>]) -> Vec<&PreparedRecording> {
     all.iter().map(|one| &**one).collect()
 }
 
@@ -210,12 +212,12 @@ impl CoreModel {
 
     #[getter]
     fn coordinates(&self) -> Vec<String> {
-        self.model.active()
+        self.model.active_coordinates()
     }
 
     #[getter]
     fn passive(&self) -> Vec<String> {
-        self.model.passive()
+        self.model.passive_coordinates()
     }
 
     #[getter]
@@ -231,7 +233,7 @@ impl CoreModel {
     /// Name, retained product, expression, unit, nominal value, whether that is given.
     #[getter]
     fn base(&self) -> Vec<(String, String, String, String, f64, bool)> {
-        let infos = self.model.infos();
+        let infos = self.model.parameter_infos();
         let all = self.model.base.iter().zip(infos).enumerate();
         all.map(|(k, (base, info))| {
             (
@@ -262,10 +264,10 @@ impl CoreModel {
 
     fn equations(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format = match format {
-            "text" => Some(Format::Text),
-            "markdown" => Some(Format::Markdown),
-            "latex" => Some(Format::Latex),
-            "html" => Some(Format::Html),
+            "text" => Some(PageFormat::Text),
+            "markdown" => Some(PageFormat::Markdown),
+            "latex" => Some(PageFormat::Latex),
+            "html" => Some(PageFormat::Html),
             "json" => None,
             other => {
                 let says =
@@ -285,7 +287,7 @@ impl CoreModel {
         let checked = self.run_interruptible(py, None, || self.model.check())?;
         Ok(PythonResult::new(
             &checked.json(&PythonSpelling),
-            &checked.text(Style::PLAIN),
+            &checked.text(TerminalStyle::PLAIN),
             RemarkList::new(),
         ))
     }
@@ -296,10 +298,10 @@ impl CoreModel {
         at: Vec<(String, f64)>,
         view: Option<[f64; 2]>,
     ) -> PyResult<String> {
-        let drawing = Drawing {
+        let drawing = PictureOptions {
             at,
             from: view,
-            ..Drawing::default()
+            ..PictureOptions::default()
         };
         self.run_interruptible(py, None, || self.model.picture(&drawing, None))
     }
@@ -311,6 +313,7 @@ impl CoreModel {
 
     /// Evaluates a function at states. Returns its numbers state by state and row by row, and its shape.
     #[allow(clippy::too_many_arguments, reason = "each is an array of Python")]
+    #[pyo3(name = "at")]
     fn evaluate_at<'py>(
         &self,
         py: Python<'py>,
@@ -322,17 +325,26 @@ impl CoreModel {
         values: Vec<f64>,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, [usize; 2])> {
         let function = function_by_name(py, function)?;
-        let given = Given {
+        let given = StateSamples {
             q: state_matrix(py, &q)?,
-            qd: qd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
-            qdd: qdd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
-            forces: forces.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            qd: qd
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
+            qdd: qdd
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
+            forces: forces
+                .as_ref()
+                .map(|array| state_matrix(py, array))
+                .transpose()?,
         };
         let few = given.q.numbers.len() <= FEW * given.q.width;
         let functions = &self.functions;
         let job = || {
             let shape = functions.shape(function)?;
-            Ok((functions.at(function, &given, &values)?, shape))
+            Ok((functions.evaluate_at(function, &given, &values)?, shape))
         };
         let (found, shape) = if few {
             run_blocking(py, job)?
@@ -396,7 +408,7 @@ impl CoreModel {
         let data = recordings(&data);
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.compare(&borrow_recordings(&data), &values)?;
-            let text = found.text(name, Style::PLAIN);
+            let text = found.text(name, TerminalStyle::PLAIN);
             let json = found.json(name, &PythonSpelling)?;
             Ok(PythonResult::new(&json, &text, remarks(&found.notes)))
         })
@@ -427,7 +439,7 @@ impl CoreModel {
             let found = self
                 .model
                 .identify_with(&data, &instruments, &check, &estimation)?;
-            let text = found.text(&self.model, Style::PLAIN, &PythonSpelling);
+            let text = found.text(&self.model, TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(&self.model, &PythonSpelling)?;
             let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_values(found.values()))
@@ -443,19 +455,25 @@ impl CoreModel {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PythonResult> {
         let (data, check) = (recordings(&data), recordings(&check));
-        let question = Question {
-            held: if held { Held::All } else { Held::Known },
-            ..Question::default()
+        let question = DiagnosisOptions {
+            fixed: if held {
+                FixedParameters::All
+            } else {
+                FixedParameters::Known
+            },
+            ..DiagnosisOptions::default()
         };
         self.run_interruptible(py, progress.as_ref(), || {
-            let found = self
-                .model
-                .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
+            let found = self.model.diagnose(
+                &borrow_recordings(&data),
+                &borrow_recordings(&check),
+                &question,
+            )?;
             let spelling = PythonSpelling;
-            let text = found.text(Style::PLAIN, &spelling).join("\n");
+            let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
             let better = match found.entries.as_slice() {
                 [] => None,
-                entries => Some(self.with_same_host(self.model.with(entries)?)),
+                entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };
             Ok(
                 PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
@@ -476,15 +494,15 @@ impl CoreModel {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PythonResult> {
         let what = valid_options(py, options::runs_options(&per_run, &loads))?;
-        let mut all: Vec<Result<Arc<Recording>, Unread>> =
+        let mut all: Vec<Result<Arc<PreparedRecording>, UnreadRun>> =
             recordings(&data).into_iter().map(Ok).collect();
         for (place, file, says) in unread {
             let error = Error::input(says);
-            all.insert(place.min(all.len()), Err(Unread { file, error }));
+            all.insert(place.min(all.len()), Err(UnreadRun { file, error }));
         }
         self.run_interruptible(py, progress.as_ref(), || {
             let found = self.model.runs(all, &what)?;
-            let text = found.text(Style::PLAIN, &PythonSpelling);
+            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(&PythonSpelling);
             let told = PythonResult::new(&json, &text, remarks(&found.notes));
             Ok(told.with_page(runs_page(&found, &PythonSpelling)))
@@ -517,17 +535,17 @@ impl CoreModel {
     ) -> PyResult<Self> {
         let values = values
             .into_iter()
-            .map(|(symbol, value)| (symbol, Said::Value(value)));
+            .map(|(symbol, value)| (symbol, SettingValue::Value(value)));
         let names = names
             .into_iter()
-            .map(|(symbol, name)| (symbol, Said::Name(name)));
+            .map(|(symbol, name)| (symbol, SettingValue::Name(name)));
         let settings = values.chain(names);
-        let settings: Vec<Setting> = settings
-            .map(|(symbol, said)| Setting { symbol, said })
+        let settings: Vec<EffectSetting> = settings
+            .map(|(symbol, value)| EffectSetting { symbol, value })
             .collect();
         let model = self.run_interruptible(py, None, || {
             let effect = new_effect(&self.model.loaded.kinds, kind, &at, &settings)?;
-            self.model.with(&[effect])
+            self.model.with_added_effects(&[effect])
         })?;
         Ok(self.with_same_host(model))
     }
@@ -565,8 +583,12 @@ impl CoreModel {
             let found = self
                 .model
                 .interpret(&self.fit(fit, name)?, name, &unknown)?;
-            let text = found.text(Style::PLAIN, &PythonSpelling);
-            Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
+            let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
+            Ok(PythonResult::new(
+                &found.json(),
+                &text,
+                remarks(&found.notes),
+            ))
         })
     }
 
@@ -615,15 +637,15 @@ impl CoreModel {
         let runs = [recordings(&data), recordings(&other_data)];
         self.run_interruptible(py, progress.as_ref(), || {
             let [before, after] = models;
-            let changes = Changes::between(before, after);
+            let changes = ModelChanges::from_models(before, after);
             let mut object = changes.json(before, after);
-            let mut text = changes.text(before, after, Style::PLAIN);
+            let mut text = changes.text(before, after, TerminalStyle::PLAIN);
             let mut notes = RemarkList::new();
             if !runs[0].is_empty() {
                 let [first, second] = [&runs[0], &runs[1]].map(|runs| borrow_recordings(runs));
-                let variants = Variants::along(models, [&first, &second])?;
+                let variants = VariantComparison::along_recordings(models, [&first, &second])?;
                 object["along"] = variants.json(&PythonSpelling);
-                text = format!("{text}\n\n{}", variants.text(Style::PLAIN));
+                text = format!("{text}\n\n{}", variants.text(TerminalStyle::PLAIN));
                 notes = remarks(&variants.notes);
             }
             Ok(PythonResult::new(&object, &text, notes))
@@ -639,15 +661,15 @@ impl CoreModel {
         reactions: bool,
         self_test: bool,
     ) -> PyResult<Vec<(String, String)>> {
-        let Some(language) = Language::named(language) else {
-            let known: Vec<&str> = Language::all().map(Language::name).collect();
+        let Some(language) = CodeLanguage::from_name(language) else {
+            let known: Vec<&str> = CodeLanguage::all().map(CodeLanguage::name).collect();
             let says = format!(
                 "language={language:?}: expected one of {}",
                 known.join(", ")
             );
             return Err(input_error(py, &says));
         };
-        let code = Code {
+        let code = CodeOptions {
             language,
             dynamics,
             reactions,
@@ -668,7 +690,7 @@ pub(crate) fn contents(py: Python<'_>, path: PathBuf) -> PyResult<PythonResult> 
     let found = run_interruptible(py, &listener, None, || host.recordings(&path))?;
     Ok(PythonResult::new(
         &found.json(),
-        &found.text(Style::PLAIN),
+        &found.text(TerminalStyle::PLAIN),
         RemarkList::new(),
     ))
 }

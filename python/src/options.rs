@@ -1,10 +1,14 @@
 //! Converts keywords of Python to options of the library, and refuses invalid values.
 
-use modelmill::diagnose::Named;
-use modelmill::excite::{Criterion, Limit, Options, Request, Separate};
-use modelmill::identify::{Estimation, Refinement, Weights};
-use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, Preparation, Reading, Smoothing};
-use modelmill::runs::{Asked, KnownLoad, PerRun};
+use modelmill::diagnose::NamedEffect;
+use modelmill::excite::{
+    ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit,
+};
+use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
+use modelmill::recording::{
+    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation,
+};
+use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
 
 /// An option, or a sentence with the fault of its value.
@@ -29,8 +33,8 @@ pub(crate) struct ReadingOptions {
 }
 
 impl ReadingOptions {
-    pub(crate) fn reading(&self) -> OptionResult<Reading> {
-        let usual = Preparation::default();
+    pub(crate) fn reading(&self) -> OptionResult<RecordingOptions> {
+        let usual = StatePreparation::default();
         let order = self.order.unwrap_or(usual.order);
         if !(1..=MAX_FILTER_ORDER).contains(&order) {
             return Err(format!(
@@ -49,10 +53,14 @@ impl ReadingOptions {
                 "between=({from}, {to}): expected two times in s, the first before the second"
             ));
         }
-        Ok(Reading {
+        Ok(RecordingOptions {
             columns: self.columns.clone(),
-            preparation: Preparation {
-                cutoff_hz: check_positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
+            preparation: StatePreparation {
+                cutoff_hz: check_positive(
+                    "cutoff_hz",
+                    self.cutoff_hz,
+                    "a frequency in Hz such as 25",
+                )?,
                 order,
                 trim: self.trim,
                 decimate: self.decimate,
@@ -60,7 +68,9 @@ impl ReadingOptions {
                 source: match self.source.as_str() {
                     "recorded" => DerivativeSource::RecordedFirst,
                     "positions" => DerivativeSource::Positions,
-                    other => return Err(expected_one_of("source", other, &["recorded", "positions"])),
+                    other => {
+                        return Err(expected_one_of("source", other, &["recorded", "positions"]));
+                    }
                 },
                 smoothing: self.smoothing()?,
                 ..usual
@@ -71,13 +81,13 @@ impl ReadingOptions {
         })
     }
 
-    fn smoothing(&self) -> OptionResult<Smoothing> {
+    fn smoothing(&self) -> OptionResult<SmoothingMethod> {
         let period = check_positive("period", self.period, "a time in s such as 7.29")?;
         Ok(match (self.smoothing.as_str(), period) {
-            ("auto", None) => Smoothing::Automatic,
-            ("auto" | "fourier", period) => Smoothing::Fourier { period },
-            ("butterworth", _) => Smoothing::Butterworth,
-            ("savitzky_golay", _) => Smoothing::SavitzkyGolay,
+            ("auto", None) => SmoothingMethod::Automatic,
+            ("auto" | "fourier", period) => SmoothingMethod::Fourier { period },
+            ("butterworth", _) => SmoothingMethod::Butterworth,
+            ("savitzky_golay", _) => SmoothingMethod::SavitzkyGolay,
             (other, _) => {
                 let known = ["auto", "butterworth", "savitzky_golay", "fourier"];
                 return Err(expected_one_of("smoothing", other, &known));
@@ -99,14 +109,22 @@ pub(crate) struct EstimationOptions {
 }
 
 impl EstimationOptions {
-    pub(crate) fn estimation(&self) -> OptionResult<Estimation> {
-        let prior = check_positive("prior", self.prior, "a relative standard deviation such as 0.2")?;
+    pub(crate) fn estimation(&self) -> OptionResult<EstimatorOptions> {
+        let prior = check_positive(
+            "prior",
+            self.prior,
+            "a relative standard deviation such as 0.2",
+        )?;
         let refinement = match (prior, self.physical, self.essential) {
-            (None, false, false) => Refinement::None,
-            (Some(sigma), false, false) => Refinement::Prior(sigma),
-            (None, true, false) => Refinement::Physical,
-            (None, false, true) => Refinement::Essential,
-            _ => return Err("prior, physical and essential exclude each other; give one of them".to_owned()),
+            (None, false, false) => EstimateRefinement::None,
+            (Some(sigma), false, false) => EstimateRefinement::Prior(sigma),
+            (None, true, false) => EstimateRefinement::Physical,
+            (None, false, true) => EstimateRefinement::Essential,
+            _ => {
+                return Err(
+                    "prior, physical and essential exclude each other; give one of them".to_owned(),
+                );
+            }
         };
         if self
             .standstill
@@ -114,12 +132,12 @@ impl EstimationOptions {
         {
             return Err("standstill: expected a number between 0 and 1, such as 0.01".to_owned());
         }
-        Ok(Estimation {
+        Ok(EstimatorOptions {
             weights: match self.weights.as_str() {
-                "auto" => Weights::Automatic,
-                "none" => Weights::None,
-                "channels" => Weights::Channels,
-                "variance" => Weights::Variance,
+                "auto" => EquationWeights::Automatic,
+                "none" => EquationWeights::None,
+                "channels" => EquationWeights::Channels,
+                "variance" => EquationWeights::Variance,
                 other => {
                     return Err(expected_one_of(
                         "weights",
@@ -154,7 +172,7 @@ pub(crate) struct ExcitationOptions {
 }
 
 impl ExcitationOptions {
-    pub(crate) fn request(&self) -> OptionResult<Request> {
+    pub(crate) fn request(&self) -> OptionResult<ExcitationRequest> {
         let within = |name: &str, value: f64, least: f64, most: f64| {
             if (least..=most).contains(&value) {
                 Ok(())
@@ -177,7 +195,7 @@ impl ExcitationOptions {
         }
         let named = |all: &[String]| {
             all.iter()
-                .map(|text| Named::parse(text))
+                .map(|text| NamedEffect::parse(text))
                 .collect::<OptionResult<_>>()
         };
         let separate = match &self.separate {
@@ -188,21 +206,27 @@ impl ExcitationOptions {
                         .to_owned(),
                 );
             }
-            Some(effect) => Some(Separate {
-                effect: Named::parse(effect)?,
+            Some(effect) => Some(SeparationRequest {
+                effect: NamedEffect::parse(effect)?,
                 from: named(&self.apart_from)?,
-                beside: named(&self.beside)?,
+                common_effects: named(&self.beside)?,
                 noise: check_positive("noise", self.noise, "a standard deviation in N or N m")?,
             }),
         };
-        Ok(Request {
+        Ok(ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
                 period: self.period,
                 criterion: match self.criterion.as_str() {
-                    "condition" => Criterion::Condition,
-                    "log_det" => Criterion::LogDet,
-                    other => return Err(expected_one_of("criterion", other, &["condition", "log_det"])),
+                    "condition" => ExcitationCriterion::Condition,
+                    "log_det" => ExcitationCriterion::LogDet,
+                    other => {
+                        return Err(expected_one_of(
+                            "criterion",
+                            other,
+                            &["condition", "log_det"],
+                        ));
+                    }
                 },
                 random: self.random,
                 starts: self.starts,
@@ -213,7 +237,7 @@ impl ExcitationOptions {
             limits: self
                 .limits
                 .iter()
-                .map(|text| Limit::parse(text))
+                .map(|text| TrajectoryLimit::parse(text))
                 .collect::<OptionResult<_>>()?,
             separate,
         })
@@ -221,11 +245,11 @@ impl ExcitationOptions {
 }
 
 /// Options for the joint fit of several runs.
-pub(crate) fn runs_options(per_run: &[String], loads: &[String]) -> OptionResult<Asked> {
-    Ok(Asked {
+pub(crate) fn runs_options(per_run: &[String], loads: &[String]) -> OptionResult<RunsOptions> {
+    Ok(RunsOptions {
         per_run: per_run
             .iter()
-            .map(|text| PerRun::parse(text))
+            .map(|text| PerRunSelection::parse(text))
             .collect::<OptionResult<_>>()?,
         loads: loads
             .iter()

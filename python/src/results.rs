@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use modelmill::recording::Recording;
-use modelmill::{Note, Severity};
+use modelmill::recording::PreparedRecording;
+use modelmill::{NoteSeverity, RecordingNote};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -15,11 +15,11 @@ use crate::spelling::PythonSpelling;
 /// Remarks, each with severity and text.
 pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
-pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a Note>) -> RemarkList {
-    let one = |note: &Note| {
+pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) -> RemarkList {
+    let one = |note: &RecordingNote| {
         let severity = match note.severity {
-            Severity::Warning => "warning",
-            Severity::Info => "info",
+            NoteSeverity::Warning => "warning",
+            NoteSeverity::Info => "info",
         };
         (severity, note.says.spell(&PythonSpelling))
     };
@@ -34,9 +34,9 @@ pub(crate) enum PythonSource<'py> {
 }
 
 /// A recording that was read and prepared for a model.
-#[pyclass(frozen)]
+#[pyclass(frozen, name = "Recording")]
 pub(crate) struct PythonRecording {
-    pub(crate) recording: Arc<Recording>,
+    pub(crate) recording: Arc<PreparedRecording>,
 }
 
 #[pymethods]
@@ -52,9 +52,10 @@ impl PythonRecording {
     }
 
     /// Times of the prepared samples, then one list per coordinate of positions, rates, accelerations, then forces.
+    #[pyo3(name = "prepared")]
     fn prepared_arrays<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
-        let runs = || self.recording.stretches.iter().map(|stretch| &stretch.run);
-        let joined = |of: &dyn Fn(&modelmill::recording::Run) -> &[Vec<f64>]| {
+        let runs = || self.recording.segments.iter().map(|segment| &segment.run);
+        let joined = |of: &dyn Fn(&modelmill::recording::PreparedRun) -> &[Vec<f64>]| {
             let width = runs().next().map_or(0, |run| of(run).len());
             let column = |k: usize| {
                 let values = runs().flat_map(|run| of(run)[k].iter().copied());
@@ -81,7 +82,7 @@ type PreparedArrays<'py> = (
 );
 
 /// The result of a method.
-#[pyclass(frozen)]
+#[pyclass(frozen, name = "Result")]
 #[derive(Default)]
 pub(crate) struct PythonResult {
     /// The JSON that the program prints with `--json`.
@@ -158,9 +159,9 @@ impl PythonResult {
 }
 
 /// A planned trajectory.
-#[pyclass(frozen)]
+#[pyclass(frozen, name = "Excitation")]
 pub(crate) struct PythonExcitation {
-    pub(crate) found: modelmill::excite::Excited,
+    pub(crate) found: modelmill::excite::ExcitationResult,
 }
 
 #[pymethods]
@@ -172,7 +173,7 @@ impl PythonExcitation {
 
     #[getter]
     fn text(&self) -> String {
-        let plain = modelmill::text::style::Style::PLAIN;
+        let plain = modelmill::text::style::TerminalStyle::PLAIN;
         self.found.text(plain, &PythonSpelling)
     }
 

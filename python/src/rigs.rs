@@ -12,9 +12,9 @@ use crate::results::{PythonResult, RemarkList};
 use crate::work::run_interruptible;
 
 /// The recording of a simulated rig.
-#[pyclass(frozen)]
+#[pyclass(frozen, name = "Simulation")]
 pub(crate) struct PythonSimulation {
-    made: modelmill::simulate::Simulated,
+    made: modelmill::simulate::RigSimulation,
 }
 
 #[pymethods]

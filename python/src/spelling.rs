@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use modelmill::Model;
-use modelmill::diagnose::{Named, Separation};
+use modelmill::diagnose::{NamedEffect, SeparationProposal};
 use modelmill::edit::NewEffect;
 use modelmill::print::{CommandName, OptionName, OptionSetting, RemedySpelling, StepSpelling};
 use pyo3::prelude::*;
@@ -38,19 +38,26 @@ impl StepSpelling for PythonSpelling {
         "m.identify(data)".to_owned()
     }
 
-    fn spell_separation(&self, _: &Model, separation: &Separation) -> Option<String> {
-        let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
+    fn spell_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
+        let mut call = format!(
+            "m.excite(separate={:?}",
+            effect_argument(&separation.effect)
+        );
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
-            effect_argument(&Named {
+            effect_argument(&NamedEffect {
                 effect,
                 values: Vec::new(),
             })
         });
         let list = |all: Vec<String>| format!("{all:?}");
         let _ = write!(call, ", apart_from={}", list(rivals.collect()));
-        if !separation.beside.is_empty() {
-            let beside = separation.beside.iter().map(effect_argument).collect();
+        if !separation.common_effects.is_empty() {
+            let beside = separation
+                .common_effects
+                .iter()
+                .map(effect_argument)
+                .collect();
             let _ = write!(call, ", beside={}", list(beside));
         }
         if let Some(noise) = separation.noise {
@@ -68,7 +75,7 @@ fn places(at: &[String]) -> String {
 }
 
 /// An effect as an argument of `excite`: `kind@place,place:name=value`.
-fn effect_argument(effect: &Named) -> String {
+fn effect_argument(effect: &NamedEffect) -> String {
     let mut text = format!("{}@{}", effect.effect.kind, effect.effect.at.join(","));
     for (name, value) in &effect.values {
         let _ = write!(text, ":{name}={value}");

@@ -9,10 +9,10 @@ use std::thread;
 use std::time::Duration;
 
 use modelmill::Outcome;
-use modelmill::progress::{Job, Progress};
+use modelmill::progress::{JobHandle, ProgressListener};
 use pyo3::prelude::*;
 
-use crate::errors::{library_error, input_error};
+use crate::errors::{input_error, library_error};
 
 /// Interval at which interrupts are checked and progress is reported.
 const TICK: Duration = Duration::from_millis(50);
@@ -23,12 +23,12 @@ pub(crate) struct JobListener(Mutex<ListenerState>);
 
 #[derive(Default)]
 struct ListenerState {
-    jobs: Vec<(String, usize, Arc<Job>)>,
+    jobs: Vec<(String, usize, Arc<JobHandle>)>,
     stops: bool,
 }
 
-impl Progress for JobListener {
-    fn begins(&self, what: &str, total: usize, job: &Arc<Job>) {
+impl ProgressListener for JobListener {
+    fn on_job_start(&self, what: &str, total: usize, job: &Arc<JobHandle>) {
         let mut heard = self.lock_state();
         if heard.stops {
             job.cancel();
@@ -36,7 +36,7 @@ impl Progress for JobListener {
         heard.jobs.push((what.to_owned(), total, Arc::clone(job)));
     }
 
-    fn ends(&self) {
+    fn on_job_end(&self) {
         self.lock_state().jobs.pop();
     }
 }

@@ -68,7 +68,7 @@ impl<'a> PlanNames<'a> {
             {
                 None => log.unknown_name(0, name, "group", &known),
                 Some(_) if used.contains(name.get_ref()) => {
-                    report_duplicate(name, "part or lumped mass", log)
+                    report_duplicate(name, "part or lumped mass", log);
                 }
                 Some((group, members)) => {
                     used.push(group.clone());

@@ -1,4 +1,4 @@
-//! From merged entries to a rig: names are looked up, numbers checked. All findings are collected.
+//! Assembles a rig from merged entries: names are resolved and numbers are checked. All errors are collected.
 
 use modelmill_spec::Diagnostic;
 use nalgebra::{Matrix3, Vector3};
@@ -19,9 +19,12 @@ use crate::pose::BodyPose;
 use crate::rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
 use crate::sensor::RigSensors;
 
-/// Makes the rig of a chain of files, the rig's own first, then what it extends.
+/// Assembles the rig of a chain of files, the rig's own first, then those that it extends.
+///
+/// Fails with all errors, in the order of their places.
 pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnostic>> {
     let mut log = RigLog::default();
+    // The last file of the chain is the base of the others.
     let mut files = chain.into_iter().rev();
     let Some((file, first)) = files.next() else {
         return Err(Vec::new());
@@ -34,14 +37,16 @@ pub(crate) fn assemble(chain: Vec<(usize, RigEntry)>) -> Result<Rig, Vec<Diagnos
     if log.0.is_empty() {
         Ok(rig)
     } else {
+        // In the order of the files, and of the places in each file.
         log.0
             .sort_by_key(|found| found.span.map(|span| (span.file, span.start)));
         Err(log.0)
     }
 }
 
-/// The rig of merged entries.
+/// The rig of merged entries, with errors in the log.
 fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
+    // Bodies first, since points name them; joints, coordinates, drives and effects then name what precedes.
     let mut rig = Rig {
         name: merged.name.clone(),
         title: merged.title.clone(),
@@ -60,6 +65,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
         seed: merged.seed.unwrap_or(0),
     };
     for point in &merged.points {
+        // A point on an unknown body is attached to the base, so that its name still exists.
         let on = find_body(&rig, point.file, &point.entry.on, log);
         let at = vector(point.file, Some(&point.entry.at), log);
         rig.points.push(RigPoint {
@@ -92,6 +98,7 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
             .rate
             .as_ref()
             .map(|rate| above_zero(rate.file, &rate.entry, "a sampling rate", log)),
+        // Without encoders a recording contains exact derivatives, unless the file states otherwise.
         derivatives: merged.derivatives.unwrap_or(merged.encoders.is_empty()),
         encoders: channels(
             &merged.encoders,
@@ -109,9 +116,10 @@ fn build(merged: &MergedRig, log: &mut RigLog) -> Rig {
     rig
 }
 
-/// A rig needs coordinates, as many drives, and columns that can be told apart.
+/// Checks that a rig has coordinates, as many drives, and columns with different names.
 fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     let (n_coordinates, n_drives) = (merged.coordinates.len(), merged.drives.len());
+    // One drive per degree of freedom; the error is placed at the last entry.
     if n_coordinates == 0 || n_drives != n_coordinates {
         let drives = merged.drives.last().map(|d| (d.file, d.entry.name.span()));
         let last = drives.or(merged
@@ -121,13 +129,12 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
         let (file, range) = last.unwrap_or((0, 0..0));
         log.error(
             source_span(file, &range),
-            format!(
-                "coordinates ({n_coordinates}) and drives ({n_drives}) of this rig do not match"
-            ),
+            format!("this rig has {n_coordinates} coordinate(s) and {n_drives} drive(s)"),
             "",
             "give one `[[coordinate]]` and one `[[drive]]` per degree of freedom",
         );
     }
+    // Columns of a recording: time, each coordinate with its derivatives, and each drive.
     let mut columns = vec!["t".to_owned()];
     let coordinates = merged
         .coordinates
@@ -145,7 +152,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
             if columns.contains(&column) {
                 log.error(
                     source_span(file, &name.span()),
-                    format!("two columns of a recording would be called `{column}`"),
+                    format!("two columns of the recording would have the name `{column}`"),
                     "",
                     "choose another name",
                 );
@@ -155,6 +162,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     }
 }
 
+/// A body; its inertia must be physically possible.
 fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     let (file, entry) = (item.file, &item.entry);
     let inertia = entry
@@ -163,17 +171,18 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
         .map_or_else(Matrix3::zeros, |spanned| {
             let i = spanned.get_ref();
             let matrix = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
+            // Eigenvalues are computed for finite entries only.
             let moments = if matrix.iter().all(|x| x.is_finite()) {
                 matrix.symmetric_eigenvalues()
             } else {
                 Vector3::repeat(f64::NAN)
             };
-            // A planar model gives zz alone, which no body has; it does no harm where only that one counts.
+            // A planar model has zz alone, which no real body has; this is accepted where only zz has an effect.
             if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
                 log.error(
                     source_span(file, &spanned.span()),
                     format!(
-                        "no body has this inertia: its principal moments are {:.4}, {:.4}, {:.4}",
+                        "this inertia is not physically possible: its principal moments are {:.4}, {:.4}, {:.4}",
                         moments[0], moments[1], moments[2]
                     ),
                     "expected principal moments that are not below zero",
@@ -182,6 +191,7 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
             }
             matrix
         });
+    // Without `at` and `rpy` the body's frame is the base frame in the nominal configuration.
     RigBody {
         name: entry.name.get_ref().clone(),
         nominal: BodyPose::from_xyz_rpy(
@@ -194,11 +204,10 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     }
 }
 
-/// Index of a body; `Some(None)` is the base.
-/// A name that leads nowhere, which was reported.
+/// A name that does not exist, which has been reported.
 struct UnknownBody;
 
-/// A body, or the base, which is none.
+/// Index of a body; `None` is the base.
 fn find_body(
     rig: &Rig,
     file: usize,
@@ -220,6 +229,7 @@ fn find_body(
     found.map(Some).ok_or(UnknownBody)
 }
 
+/// The place of a named point; reports an unknown name.
 fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<BodyAnchor> {
     let found = rig
         .points
@@ -232,6 +242,7 @@ fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
     found.map(|point| point.anchor)
 }
 
+/// Index of a joint with exactly one coordinate; reports any other.
 fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<usize> {
     let found = rig
         .joints
@@ -246,7 +257,10 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
         Some(at) if rig.joints[at].motion.is_none() => {
             log.error(
                 source_span(file, &name.span()),
-                format!("the joint `{}` has no single coordinate", name.get_ref()),
+                format!(
+                    "the joint `{}` does not have exactly one coordinate",
+                    name.get_ref()
+                ),
                 "expected a revolute or a prismatic joint",
                 "",
             );
@@ -256,6 +270,7 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
     }
 }
 
+/// A lumped mass, whose two points must be on one body.
 fn lumped_mass(
     rig: &Rig,
     item: &FileItem<RigLumpedMassEntry>,
@@ -268,6 +283,7 @@ fn lumped_mass(
         None => at,
         Some(name) => find_point(rig, file, name, log)?,
     };
+    // The moment of a lumped mass may act at another point, but only on the same body.
     if let Some(name) = entry
         .moment_at
         .as_ref()
@@ -281,7 +297,7 @@ fn lumped_mass(
                 entry.at.get_ref()
             ),
             "expected a point of the same body",
-            "both balances are those of one body",
+            "the mass belongs to one body, in the balance of forces and in the balance of moments",
         );
     }
     Some(RigLumpedMass {
@@ -291,6 +307,7 @@ fn lumped_mass(
     })
 }
 
+/// A joint with its equations and its coordinate; without equations where an error has been reported.
 fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoint {
     let (file, entry) = (item.file, &item.entry);
     let mut joint = RigJoint {
@@ -298,6 +315,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         equations: Vec::new(),
         motion: None,
     };
+    // Each error returns the joint without equations, so that its name still exists.
     let Some(kind) = joint::RigJointKind::from_name(entry.kind.get_ref()) else {
         log.unknown_name(
             file,
@@ -312,6 +330,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         find_body(rig, file, one, log),
         find_body(rig, file, two, log),
     );
+    // Without `axis` the joint's axis is z of the base frame.
     let axis = entry
         .axis
         .as_ref()
@@ -333,7 +352,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         let range = entry.between.span();
         log.error(
             source_span(file, &range),
-            "this joint joins a body to itself".to_owned(),
+            "this joint connects a body to itself".to_owned(),
             "expected two bodies",
             "",
         );
@@ -342,6 +361,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     let Some([from, to]) = joint_anchors(rig, file, entry, [first, second], log) else {
         return joint;
     };
+    // Directions of the equations are those of the nominal configuration, in the frames of both bodies.
     let nominal =
         |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let parts = joint::equations(
@@ -356,7 +376,7 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     joint
 }
 
-/// Where the joint is on each of its bodies.
+/// The place of a joint on each of its bodies.
 fn joint_anchors(
     rig: &Rig,
     file: usize,
@@ -364,6 +384,7 @@ fn joint_anchors(
     bodies: [Option<usize>; 2],
     log: &mut RigLog,
 ) -> Option<[BodyAnchor; 2]> {
+    // A place in the base frame becomes a place in the frame of a body, both in the nominal configuration.
     let nominal =
         |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let on = |body: Option<usize>, p_W: Vector3<f64>| {
@@ -375,10 +396,12 @@ fn joint_anchors(
     };
     let whole = source_span(file, &entry.name.span());
     match (&entry.at, &entry.points) {
+        // The joint has one place in the base frame.
         (Some(at), None) => {
             let at = vector(file, Some(at), log);
             Some(bodies.map(|body| on(body, at)))
         }
+        // The joint has a point of one body, which gives the place on the other, or a point of each body.
         (None, Some(points)) => {
             let names = points.get_ref();
             let anchors: Vec<BodyAnchor> = names
@@ -404,7 +427,7 @@ fn joint_anchors(
                 _ => {
                     log.error(
                         source_span(file, &points.span()),
-                        "these points do not fit the joint's bodies".to_owned(),
+                        "these points are not on the bodies of this joint".to_owned(),
                         "expected one point of either body, or one of each in the order of `between`",
                         "",
                     );
@@ -415,8 +438,8 @@ fn joint_anchors(
         _ => {
             log.error(
                 whole,
-                "it is not clear where this joint is".to_owned(),
-                "expected one of `at` and `points`",
+                "the place of this joint is missing, or stated twice".to_owned(),
+                "expected either `at` or `points`",
                 "`at = [x, y, z]` is in the base frame, nominal configuration; `points` names points of its bodies",
             );
             None
@@ -424,6 +447,7 @@ fn joint_anchors(
     }
 }
 
+/// The distance of two points of different bodies.
 fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Option<PairFunction> {
     let from = find_point(rig, file, &entry.from, log);
     let to = find_point(rig, file, &entry.to, log);
@@ -432,6 +456,7 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Opti
         to: to?,
         shape: PairQuantity::Distance,
     };
+    // Two points of one body never move relative to each other.
     if pair.from.body == pair.to.body {
         log.error(
             source_span(file, &entry.to.span()),
@@ -444,9 +469,11 @@ fn length(rig: &Rig, file: usize, entry: &LengthEntry, log: &mut RigLog) -> Opti
     Some(pair)
 }
 
+/// Adds a coordinate, and sets its joint's nominal value.
 fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     let nominal = entry.nominal.as_ref().map(|n| *n.get_ref());
+    // Only a joint has a nominal value of its own.
     if let Some(wrong) = entry
         .nominal
         .as_ref()
@@ -454,15 +481,17 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
     {
         log.error(
             source_span(file, &wrong.span()),
-            "this nominal value means nothing".to_owned(),
-            "expected a finite value of a joint's coordinate; a length follows from its points",
+            "this nominal value is not valid".to_owned(),
+            "expected a finite value, for the coordinate of a joint; a length is determined by its points",
             "",
         );
     }
+    // A coordinate measures either a joint or the distance of two points.
     let measures = match (&entry.joint, &entry.length) {
         (Some(name), None) => find_joint(rig, file, name, log).and_then(|joint| {
             let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
             let motion = rig.joints[joint].motion.as_mut()?;
+            // The reference of the joint is shifted so that its value in the nominal configuration is the stated one.
             if let Some(nominal) = nominal {
                 joint::set_nominal(motion, nominal, &poses);
             }
@@ -481,8 +510,10 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
         }));
 }
 
+/// Adds a drive.
 fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
+    // A drive acts either in a joint or along the distance of two points.
     let measures = match (&entry.joint, &entry.linear) {
         (Some(name), None) => {
             find_joint(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
@@ -499,15 +530,20 @@ fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     }));
 }
 
+/// Reports an entry with none or several of the keys that define it.
 fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog) {
     log.error(
         source_span(file, &name.span()),
-        format!("it is not clear what `{}` is", name.get_ref()),
-        &format!("expected one of {keys}"),
+        format!(
+            "the definition of `{}` is missing, or stated twice",
+            name.get_ref()
+        ),
+        &format!("expected exactly one of {keys}"),
         "",
     );
 }
 
+/// An effect; reports its errors at the places of the entry.
 fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Option<RigEffect> {
     let (file, entry) = (item.file, &item.entry);
     let at: Vec<&str> = entry
@@ -521,6 +557,7 @@ fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Optio
         .iter()
         .map(|(name, value)| (name.get_ref().as_str(), *value.get_ref()))
         .collect();
+    // Programs construct effects through the same function; here its faults get their places in the file.
     let faults = match rig.effect(entry.kind.get_ref(), &at, &values) {
         Ok(effect) => return Some(effect),
         Err(faults) => faults,

@@ -1,11 +1,11 @@
-//! From the entries of encoders and force sensors to the channels of a rig.
+//! Converts the entries of encoders and force sensors to the channels of a rig.
 
 use crate::file::{RigName, SensorEntry};
 use crate::load::source_span;
 use crate::log::{FileItem, RigLog, above_zero, not_negative};
 use crate::sensor::SensorChannel;
 
-/// One channel per name; ideal where no sensor is described. A later sensor replaces an earlier one.
+/// One channel per name; ideal if no sensor is described. A later sensor replaces an earlier one.
 pub(crate) fn channels<'a>(
     items: &[FileItem<SensorEntry>],
     what: &str,
@@ -13,6 +13,7 @@ pub(crate) fn channels<'a>(
     log: &mut RigLog,
 ) -> Vec<SensorChannel> {
     let names: Vec<&str> = names.map(|name| name.get_ref().as_str()).collect();
+    // Without a sensor a channel is ideal: no noise, no quantisation, no delay.
     let mut channels = vec![SensorChannel::default(); names.len()];
     for item in items {
         let channel = channel(item, what, log);
@@ -26,9 +27,11 @@ pub(crate) fn channels<'a>(
     channels
 }
 
+/// The channel of one entry; `what` is `coordinate` for encoders.
 fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> SensorChannel {
     let (file, entry) = (item.file, &item.entry);
     let mut resolution = not_negative(file, entry.resolution.as_ref(), "a resolution", log);
+    // A resolution is given directly, by the bits of an encoder, or by that of a current.
     let ways = usize::from(entry.resolution.is_some())
         + usize::from(entry.bits.is_some())
         + usize::from(entry.current.is_some());
@@ -44,11 +47,12 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
         if what != "coordinate" || !(1..=52).contains(bits.get_ref()) {
             log.error(
                 source_span(file, &bits.span()),
-                "this number of bits means nothing here".to_owned(),
-                "expected 1 to 52, of an encoder",
-                "an encoder of `bits = 20` tells 2^20 angles of a turn apart",
+                "`bits` is not valid here".to_owned(),
+                "expected 1 to 52 bits, for an encoder",
+                "an encoder with `bits = 20` resolves 2^20 angles per revolution",
             );
         } else {
+            // A full revolution, in rad, divided into 2^bits steps.
             resolution = 2.0 * std::f64::consts::PI / (1_u64 << bits.get_ref()) as f64;
         }
     }
@@ -56,16 +60,22 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
         if what == "coordinate" {
             log.error(
                 source_span(file, &entry.of.span()),
-                "an encoder reads no current".to_owned(),
+                "an encoder does not measure a current".to_owned(),
                 "",
                 "`current` belongs to a `[[force_sensor]]`",
             );
         }
+        // Resolution of a current in A times the force per ampere, N/A or N m/A.
         resolution = above_zero(file, &current.force_per_ampere, "a force per ampere", log)
             * above_zero(file, &current.resolution, "a resolution", log);
     }
     SensorChannel {
-        noise: not_negative(file, entry.noise.as_ref(), "a noise's deviation", log),
+        noise: not_negative(
+            file,
+            entry.noise.as_ref(),
+            "a standard deviation of noise",
+            log,
+        ),
         resolution,
         delay: not_negative(file, entry.delay.as_ref(), "a delay", log),
     }

@@ -1,8 +1,8 @@
-//! Inverse dynamics: the drives' forces that a motion takes.
+//! Inverse dynamics: the forces of the drives for a motion.
 //!
 //! Newton and Euler's equations of each body by itself give the forces `f` that all joints and drives together
 //! must supply, `J' lambda + B tau = f`. The reactions `lambda` of redundant joints are not unique, `tau` is:
-//! the rates per unit rate of a coordinate are orthogonal to every reaction, and what they leave of both sides
+//! the rates per unit rate of a coordinate are orthogonal to every reaction. The projection of both sides onto them
 //! is a small system for `tau` alone.
 //! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 11.2 and 11.5.
 //!
@@ -19,7 +19,7 @@ use crate::pair::PairFunction;
 use crate::pose::{BodyMotion, BodyPose};
 use crate::rig::Rig;
 
-/// A pivot below this share of the largest says that a drive has no leverage.
+/// A pivot below this share of the largest means that the drives cannot balance every load.
 const LEVERAGE_TOLERANCE: f64 = 1e-10;
 
 /// Value, rate and acceleration of a coordinate, a joint or a drive.
@@ -33,21 +33,23 @@ pub struct ScalarMotion {
     pub acceleration: f64,
 }
 
-/// Forces or torques of all drives, N or N m, in the rig's order; `loads` are forces that effects in the joints
-/// add, each along the motion of its place, and that the drives must supply besides.
+/// Forces or torques of all drives, N or N m, in the rig's order. `loads` are additional forces of effects in the
+/// joints, each along the motion of its place.
 ///
-/// Fails where the drives cannot balance a load.
+/// Fails if the drives cannot balance a load.
 pub(crate) fn drive_forces(
     rig: &Rig,
     motion: &RigMotion,
     loads: &[(&PairFunction, f64)],
 ) -> Result<Vec<f64>, RigPoseError> {
+    // Forces on all bodies, with those of effects in joints.
     let mut needed = body_forces(rig, motion);
     let base = base_motion();
     for (pair, force) in loads {
         let derived = pair.derive(&motion.bodies, &base);
         derived.scatter(pair, |i, slope| needed[i] += force * slope);
     }
+    // Power of every drive per unit rate of every coordinate.
     let per_rate = &motion.rates_per_coordinate;
     let n_dof = per_rate.ncols();
     let mut leverage = DMatrix::zeros(n_dof, rig.drives.len());
@@ -95,7 +97,7 @@ pub(crate) fn scalar_motion(pair: &PairFunction, motion: &RigMotion) -> ScalarMo
     }
 }
 
-/// Kinetic plus potential energy of all masses, those of effects included, J; the potential is zero at the base
+/// Kinetic plus potential energy of all masses, also those of effects, J. The potential energy is zero at the base
 /// frame's origin.
 pub fn energy(rig: &Rig, motion: &RigMotion) -> f64 {
     let gravity = massive::gravity(rig);
@@ -116,8 +118,8 @@ pub fn energy(rig: &Rig, motion: &RigMotion) -> f64 {
     sum
 }
 
-/// Forces and moments that each body needs for its motion beside gravity, six per body: the force, and the
-/// moment about the origin of its frame; those for the masses of effects included.
+/// Forces and moments that each body needs for its motion in addition to gravity, six per body: the force, N, and the
+/// moment about the origin of its frame, N m. Masses of effects are included.
 fn body_forces(rig: &Rig, motion: &RigMotion) -> DVector<f64> {
     let gravity = massive::gravity(rig);
     let mut all = DVector::zeros(6 * rig.bodies.len());
@@ -154,7 +156,7 @@ fn body_forces(rig: &Rig, motion: &RigMotion) -> DVector<f64> {
     all
 }
 
-/// The base as a body that never moves.
+/// The base as a body at standstill.
 pub(crate) fn base_motion() -> BodyMotion {
     BodyMotion::at_standstill(BodyPose::identity())
 }

@@ -1,8 +1,8 @@
-//! Effects: what friction, rotors, springs, rods, tools and the like add to the force of a drive, in a joint, at a
-//! point, to gravity or to the reading of the forces.
+//! Effects: additions of friction, rotors, springs, rods, tools and others to the force of a drive, in a joint, at a
+//! point, to gravity or to the measured forces.
 //!
-//! A place's value, rate, acceleration and load go in, the force or torque that must be supplied there besides
-//! comes out; effects with mass are in `massive`. The kinds bear the names that model files use, and their laws are
+//! A place's value, rate, acceleration and load go in, and the additional force or torque at that place
+//! comes out. Effects with mass are in `massive`. The kinds have the names that model files use, and their laws are
 //! those of the library of effects.
 //! Sources: the laws are textbook ones, e.g. B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, "A survey of
 //! models, analysis tools and compensation methods for the control of machines with friction" (1994);
@@ -13,16 +13,16 @@ use std::f64::consts::PI;
 use crate::dynamics::ScalarMotion;
 use crate::rig::Rig;
 
-/// An effect in a rig. [`Rig::effect`] makes one from names; a program may also write it down itself.
+/// An effect in a rig. [`Rig::effect`] creates one from names; a program may also construct it directly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigEffect {
-    /// What it does.
+    /// The law with its values.
     pub law: RigLaw,
-    /// Where; indices of the rig that it belongs to.
+    /// The places; indices refer to the rig.
     pub places: Vec<RigPlace>,
 }
 
-/// Where an effect acts.
+/// The place where an effect acts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RigPlace {
     /// A drive, by index.
@@ -31,9 +31,9 @@ pub enum RigPlace {
     Joint(usize),
     /// A point, by index.
     Point(usize),
-    /// The base as a whole.
+    /// The complete base.
     Base,
-    /// The measured forces as a whole.
+    /// All measured forces.
     Force,
 }
 
@@ -84,7 +84,7 @@ pub enum RigLaw {
     },
     /// `Ia*acceleration`
     DriveInertia {
-        /// Mass or inertia as felt at the place.
+        /// Mass or inertia that acts at the place.
         Ia: f64,
     },
     /// `F0`
@@ -96,7 +96,7 @@ pub enum RigLaw {
     Spring {
         /// Stiffness.
         k: f64,
-        /// Where it is at rest.
+        /// Value without force.
         rest: f64,
     },
     /// `As*sin(2*pi*value/pitch) + Ac*cos(2*pi*value/pitch)`
@@ -105,7 +105,7 @@ pub enum RigLaw {
         As: f64,
         /// Amplitude of the cosine.
         Ac: f64,
-        /// Distance after which it repeats.
+        /// Period.
         pitch: f64,
     },
     /// At each of two places, with the other's motion: `Ia*acceleration + Fv*rate + Fs*sign(rate of both)`
@@ -117,7 +117,7 @@ pub enum RigLaw {
         /// Dry friction, by the sum of both rates.
         Fs: f64,
     },
-    /// A slender rod along a linear drive: it turns about the drive's first point and slides through the second.
+    /// A slender rod along a linear drive: it rotates about the drive's first point and slides through the second.
     RodInertia {
         /// Mass, kg.
         m: f64,
@@ -131,12 +131,12 @@ pub enum RigLaw {
         /// Mass, kg.
         m: f64,
     },
-    /// Of two points of one body: the moments of a mass that sits at the first are taken as if it were at the second.
+    /// Of two points of one body: the moments of a mass at the first point are computed as if it were at the second.
     LumpedMassPlacement {
         /// Mass, kg.
         m: f64,
     },
-    /// The base stands turned against the vertical by this rotation vector, rad: gravity turns back by it.
+    /// The base is rotated against the vertical by this rotation vector, rad: gravity is rotated back by it.
     GravityTilt {
         /// About x.
         tx: f64,
@@ -145,25 +145,25 @@ pub enum RigLaw {
         /// About z.
         tz: f64,
     },
-    /// All forces are read this much later than they act, s.
+    /// All forces are read with this delay, s.
     TimeDelay {
         /// Delay, s.
         T: f64,
     },
 }
 
-/// A value that a kind takes.
+/// A value of a kind of effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueOfKind {
     /// Its symbol, as in model files.
     pub symbol: &'static str,
-    /// What it is where none is given; without one it must be given.
+    /// Its default; a value without a default must be given.
     pub default: Option<f64>,
-    /// Whether it must be above zero (lengths), or at least not below (masses, delays).
+    /// Whether it must be above zero (lengths), or not below zero (masses, delays).
     pub sign: ValueSign,
 }
 
-/// Which values make sense.
+/// The range of valid values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValueSign {
     /// Any finite number.
@@ -174,6 +174,7 @@ pub enum ValueSign {
     Positive,
 }
 
+/// Any finite number, without a default.
 const fn any_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
@@ -182,6 +183,7 @@ const fn any_value(symbol: &'static str) -> ValueOfKind {
     }
 }
 
+/// Any finite number; zero by default.
 const fn zero_by_default(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
@@ -190,6 +192,7 @@ const fn zero_by_default(symbol: &'static str) -> ValueOfKind {
     }
 }
 
+/// A number of at least zero, without a default.
 const fn not_negative_value(symbol: &'static str) -> ValueOfKind {
     ValueOfKind {
         symbol,
@@ -198,6 +201,7 @@ const fn not_negative_value(symbol: &'static str) -> ValueOfKind {
     }
 }
 
+/// A number above zero.
 const fn positive_value(symbol: &'static str, default: Option<f64>) -> ValueOfKind {
     ValueOfKind {
         symbol,
@@ -228,7 +232,7 @@ impl RigLaw {
         "time_delay",
     ];
 
-    /// The values that a kind takes; `None` for an unknown kind.
+    /// The values of a kind, in a fixed order; `None` for an unknown kind.
     pub fn values(kind: &str) -> Option<&'static [ValueOfKind]> {
         Some(match kind {
             "viscous_friction" => const { &[any_value("Fv")] },
@@ -283,7 +287,7 @@ impl RigLaw {
         })
     }
 
-    /// The law of a kind with the values of [`Law::values`] in their order; `None` for an unknown kind or another
+    /// The law of a kind with the values of [`RigLaw::values`] in their order; `None` for an unknown kind or another
     /// number of values.
     pub(crate) fn new(kind: &str, values: &[f64]) -> Option<Self> {
         Some(match (kind, values) {
@@ -344,8 +348,8 @@ impl RigLaw {
         (kind, symbols.zip(values).collect())
     }
 
-    /// What must be supplied at a drive or in a joint beside the load; `other` is the other place of a coupled drive.
-    /// Effects that act elsewhere supply nothing here.
+    /// The force at a drive or in a joint in addition to the load; `other` is the motion of the other place of a
+    /// coupled drive. Zero for effects that act elsewhere.
     pub(crate) fn force(&self, at: ScalarMotion, load: f64, other: ScalarMotion) -> f64 {
         let way = sign(at.rate);
         match *self {
@@ -359,7 +363,7 @@ impl RigLaw {
             Self::DirectionalViscousFriction { Fvp, Fvn } => {
                 at.rate * if at.rate > 0.0 { Fvp } else { Fvn }
             }
-            // At standstill the mean of both, as the library's expression has it.
+            // At standstill the mean of both values, as in the library's expression.
             Self::DirectionalCoulombFriction { Fcp, Fcn } => {
                 0.5 * (Fcp * (1.0 + way) - Fcn * (1.0 - way))
             }
@@ -384,8 +388,8 @@ impl RigLaw {
 }
 
 impl RigEffect {
-    /// Forces that the effect adds at drives and in joints, each with its place; `measured` gives the motion of a
-    /// place and `load` the force of a drive before friction and the like.
+    /// Forces of the effect at drives and in joints, each with its place. `measured` returns the motion of a
+    /// place, and `load` the force of a drive before friction and other effects.
     pub(crate) fn forces(
         &self,
         measured: impl Fn(RigPlace) -> ScalarMotion,
@@ -412,7 +416,7 @@ impl RigEffect {
 }
 
 impl RigPlace {
-    /// What is measured at the place, if it is a drive or a joint with one coordinate.
+    /// The quantity that is measured at the place, if it is a drive or a joint with one coordinate.
     pub(crate) fn pair(self, rig: &Rig) -> Option<&crate::pair::PairFunction> {
         match self {
             Self::Drive(drive) => Some(&rig.drives.get(drive)?.measures),
@@ -422,7 +426,7 @@ impl RigPlace {
     }
 }
 
-/// -1, 0 or 1.
+/// The sign of a number: -1, 0 or 1.
 fn sign(x: f64) -> f64 {
     if x > 0.0 {
         1.0

@@ -1,14 +1,14 @@
-//! Effects from names: kind, places and values as rig files and programs write them go in, a checked [`Effect`]
-//! or every fault comes out, each with what was expected and what to do.
+//! Effects from names: kind, places and values go in as rig files and programs state them. A checked [`RigEffect`]
+//! or all errors come out, each with the expected entry and a remedy.
 
 use crate::effect::{RigEffect, RigLaw, RigPlace, ValueSign};
 use crate::pair::PairFunction;
 use crate::rig::Rig;
 
-/// What is wrong with an effect.
+/// An error in an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectFault {
-    /// Which part of it.
+    /// The part that is wrong.
     pub part: EffectPart,
     /// What is wrong.
     pub message: String,
@@ -45,20 +45,29 @@ impl std::fmt::Display for EffectFault {
 
 impl std::error::Error for EffectFault {}
 
-/// Where a kind may act.
+/// The places where a kind may act.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum AllowedPlaces {
+    /// Drives, coordinates of joints, and joints with one coordinate.
     DrivesAndJoints,
+    /// Drives only, because the effect needs the load.
     Drives,
+    /// Two of the places that [`Self::DrivesAndJoints`] allows.
     TwoDrivesOrJoints,
+    /// Drives along the distance of two points.
     LinearDrives,
+    /// Points of bodies other than the base.
     Points,
+    /// Two points of one body.
     TwoPointsOfABody,
+    /// The word `base`.
     Base,
+    /// The word `force`: the signals of all drives.
     Force,
 }
 
 impl AllowedPlaces {
+    /// The allowed places of a kind.
     fn for_kind(kind: &str) -> Self {
         match kind {
             "load_friction" => Self::Drives,
@@ -72,21 +81,23 @@ impl AllowedPlaces {
         }
     }
 
+    /// The allowed places as text for messages.
     fn description(self) -> &'static str {
         match self {
             Self::DrivesAndJoints => "a drive, a coordinate or a joint with one coordinate",
-            Self::Drives => "a drive, whose load is known",
+            Self::Drives => "a drive (its load is known)",
             Self::TwoDrivesOrJoints => "two drives or joints",
             Self::LinearDrives => "a linear drive",
             Self::Points => "a point of a body",
             Self::TwoPointsOfABody => {
-                "two points of one body: where the mass is, and where moments see it"
+                "two points of one body: where the mass is, and where the balance of moments assumes it"
             }
             Self::Base => "`base`",
             Self::Force => "`force`",
         }
     }
 
+    /// Number of places; `None` for one or more.
     fn n_places(self) -> Option<usize> {
         match self {
             Self::TwoDrivesOrJoints | Self::TwoPointsOfABody => Some(2),
@@ -97,21 +108,21 @@ impl AllowedPlaces {
 }
 
 impl Rig {
-    /// An effect of this rig by names: a kind ([`Law::KINDS`]), its places, its values by symbol.
+    /// An effect of this rig by names: a kind ([`RigLaw::KINDS`]), its places, and its values by symbol.
     ///
-    /// Places are drives, coordinates, joints, points, `base` or `force`, as the kind has it. The effect acts once
-    /// it is pushed to [`Rig::effects`]. Fails with every fault of the description.
+    /// Places are drives, coordinates, joints, points, `base` or `force`, depending on the kind. The effect acts after
+    /// it has been pushed to [`Rig::effects`]. Fails with all errors of the description.
     ///
     /// ```
     /// # let text = "schema = 1\nname = 'm'\nbody = [{ name = 'cart', mass = 2 }]\n\
     /// #     joint = [{ name = 'rail', kind = 'prismatic', between = ['base', 'cart'], at = [0, 0, 0], axis = [1, 0, 0] }]\n\
     /// #     coordinate = [{ name = 'x', joint = 'rail' }]\ndrive = [{ name = 'screw', joint = 'rail' }]";
-    /// # let files = modelmill_boundary::files::Memory::default();
+    /// # let files = modelmill_boundary::files::MemoryFiles::default();
     /// # let mut rig = modelmill_rig::load("m.toml", text, &files)?.rig;
     /// let friction = rig.effect("viscous_friction", &["screw"], &[("Fv", 20.0)]).unwrap();
     /// rig.effects.push(friction);
-    /// let state = modelmill_rig::State { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };
-    /// let force = modelmill_rig::forces(&rig, &modelmill_rig::Tracker::new(&rig)?.follow(&state)?)?[0];
+    /// let state = modelmill_rig::RigState { q: vec![0.0], qd: vec![0.1], qdd: vec![3.0] };
+    /// let force = modelmill_rig::forces(&rig, &modelmill_rig::RigTracker::new(&rig)?.follow(&state)?)?[0];
     /// assert!((force - (2.0 * 3.0 + 20.0 * 0.1)).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -129,6 +140,7 @@ impl Rig {
                 help: format!("known are {}", name_list(&RigLaw::KINDS)),
             }]);
         };
+        // Values in the order of the kind; missing ones take their default, and all errors are collected.
         let mut faults = Vec::new();
         let mut numbers = Vec::new();
         for value in known {
@@ -168,6 +180,7 @@ impl Rig {
             }
             numbers.extend(number);
         }
+        // Symbols that the kind does not have.
         let symbols: Vec<&str> = known.iter().map(|value| value.symbol).collect();
         for (symbol, _) in values
             .iter()
@@ -180,6 +193,7 @@ impl Rig {
                 help: format!("known are {}", name_list(&symbols)),
             });
         }
+        // Places are checked even if values are wrong, so that one call reports all errors.
         let places = self.places(kind, at, &mut faults);
         match RigLaw::new(kind, &numbers) {
             Some(law) if faults.is_empty() => Ok(RigEffect { law, places }),
@@ -187,6 +201,7 @@ impl Rig {
         }
     }
 
+    /// The places of an effect; reports those where its kind cannot act.
     fn places(&self, kind: &str, at: &[&str], faults: &mut Vec<EffectFault>) -> Vec<RigPlace> {
         let acts = AllowedPlaces::for_kind(kind);
         let mut places = Vec::new();
@@ -202,6 +217,7 @@ impl Rig {
             };
             places.push(place);
         }
+        // A kind with a fixed number of places needs exactly that many, any other at least one.
         let wanted = acts.n_places().unwrap_or(at.len().max(1));
         let mut wrong = at.len() != wanted;
         if let [RigPlace::Point(a), RigPlace::Point(b)] = places[..]
@@ -212,7 +228,7 @@ impl Rig {
         if wrong {
             faults.push(EffectFault {
                 part: EffectPart::Places,
-                message: format!("`{kind}` does not act at these places together"),
+                message: format!("`{kind}` cannot act at this combination of places"),
                 expected: format!("expected {}", acts.description()),
                 help: String::new(),
             });
@@ -220,7 +236,9 @@ impl Rig {
         places
     }
 
+    /// The place of a name among the allowed ones.
     fn place(&self, acts: AllowedPlaces, name: &str) -> Option<RigPlace> {
+        // The joint that a coordinate measures.
         let joint = |pair: &PairFunction| {
             self.joints
                 .iter()
@@ -239,6 +257,7 @@ impl Rig {
                         .iter()
                         .position(|j| j.name == name && j.motion.is_some())
                 };
+                // Drives come first, then the joints of coordinates, then joints by their own names.
                 drive()
                     .map(RigPlace::Drive)
                     .or_else(|| {
@@ -260,6 +279,7 @@ impl Rig {
         }
     }
 
+    /// All names at which a kind may act.
     fn place_names(&self, acts: AllowedPlaces) -> Vec<&str> {
         let drives = self.drives.iter().map(|drive| drive.name.as_str());
         let coordinates = self.coordinates.iter().map(|c| c.name.as_str());
@@ -273,12 +293,13 @@ impl Rig {
             _ => drives.chain(coordinates).chain(joints).collect(),
         };
         all.into_iter()
+            // Candidates pass the same test as the name itself.
             .filter(|name| self.place(acts, name).is_some())
             .collect()
     }
 }
 
-/// A list of names for a message, cut where nobody reads on.
+/// A list of names for a message, at most 24 of them.
 pub(crate) fn name_list(names: &[&str]) -> String {
     let mut list: Vec<String> = names
         .iter()

@@ -1,4 +1,4 @@
-//! The tables of a rig file as types. Places are byte ranges, from which messages make lines and columns.
+//! The tables of a rig file as types. Places are byte ranges, from which messages compute lines and columns.
 //!
 //! Numbers are in SI units: m, kg, s, rad.
 
@@ -16,13 +16,19 @@ pub(crate) type RigName = Spanned<String>;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigEntry {
+    /// Version of the format; 1.
     pub(crate) schema: Spanned<i64>,
+    /// Name of the rig.
     pub(crate) name: RigName,
+    /// Description in one line.
     pub(crate) title: Option<String>,
-    /// Another rig file, relative to this one: entries here replace those of the same name or join them.
+    /// Another rig file, relative to this one: entries here replace those of the same name or are added to them.
     pub(crate) extends: Option<RigName>,
+    /// Acceleration of gravity in the base frame, m/s^2.
     pub(crate) gravity: Option<SpannedTriple>,
+    /// Seed of the noise.
     pub(crate) seed: Option<u64>,
+    /// Sampling of the recording.
     pub(crate) sampling: Option<SamplingEntry>,
     #[serde(default)]
     pub(crate) body: Vec<BodyEntry>,
@@ -48,20 +54,24 @@ pub(crate) struct RigEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct BodyEntry {
+    /// Unique name.
     pub(crate) name: RigName,
-    /// Origin of its frame in the base frame, nominal configuration.
+    /// Origin of its frame in the base frame in the nominal configuration, m.
     pub(crate) at: Option<SpannedTriple>,
-    /// Roll, pitch, yaw of its frame there.
+    /// Roll, pitch and yaw of its frame in the nominal configuration, rad.
     pub(crate) rpy: Option<SpannedTriple>,
+    /// Mass, kg.
     pub(crate) mass: Option<Spanned<f64>>,
-    /// Centre of mass in its frame.
+    /// Centre of mass in its frame, m.
     pub(crate) centre: Option<SpannedTriple>,
+    /// Inertia about the centre of mass.
     pub(crate) inertia: Option<Spanned<RigInertiaEntry>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// Inertia about the centre of mass along the body's axes; off the diagonal the negative products.
+/// Inertia about the centre of mass along the body's axes, kg m^2. Entries off the diagonal are the negative products
+/// of inertia.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct RigInertiaEntry {
@@ -77,9 +87,11 @@ pub(crate) struct RigInertiaEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigPointEntry {
+    /// Unique name.
     pub(crate) name: RigName,
+    /// Body that carries it, or `base`.
     pub(crate) on: RigName,
-    /// In the body's frame.
+    /// Place in the body's frame, m.
     pub(crate) at: SpannedTriple,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -89,10 +101,13 @@ pub(crate) struct RigPointEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigLumpedMassEntry {
+    /// Name, by which variants replace it.
     pub(crate) name: Option<RigName>,
+    /// Point where it acts in the balance of forces.
     pub(crate) at: RigName,
+    /// Mass, kg.
     pub(crate) mass: Spanned<f64>,
-    /// Point at which the balance of moments sees it.
+    /// Point where it acts in the balance of moments, if that is another one.
     pub(crate) moment_at: Option<RigName>,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -102,14 +117,17 @@ pub(crate) struct RigLumpedMassEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigJointEntry {
+    /// Unique name.
     pub(crate) name: RigName,
+    /// Kind of joint, by name.
     pub(crate) kind: RigName,
+    /// The two bodies that it connects.
     pub(crate) between: Spanned<[RigName; 2]>,
-    /// Place in the base frame, nominal configuration.
+    /// Place in the base frame in the nominal configuration, m.
     pub(crate) at: Option<SpannedTriple>,
-    /// Instead, one point, or one on each body in the order of `between`.
+    /// Alternative to `at`: one point, or one on each body in the order of `between`.
     pub(crate) points: Option<Spanned<Vec<RigName>>>,
-    /// Direction in the base frame, nominal configuration.
+    /// Direction in the base frame in the nominal configuration.
     pub(crate) axis: Option<SpannedTriple>,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -119,10 +137,13 @@ pub(crate) struct RigJointEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigCoordinateEntry {
+    /// Unique name, which is that of its column.
     pub(crate) name: RigName,
+    /// Joint that it measures.
     pub(crate) joint: Option<RigName>,
+    /// Alternative to `joint`: the distance that it measures.
     pub(crate) length: Option<LengthEntry>,
-    /// Its value in the nominal configuration.
+    /// Its value in the nominal configuration, rad or m.
     pub(crate) nominal: Option<Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
@@ -132,7 +153,9 @@ pub(crate) struct RigCoordinateEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LengthEntry {
+    /// First point.
     pub(crate) from: RigName,
+    /// Second point.
     pub(crate) to: RigName,
 }
 
@@ -140,19 +163,25 @@ pub(crate) struct LengthEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigDriveEntry {
+    /// Unique name, which is that of its column.
     pub(crate) name: RigName,
+    /// Joint in which it acts.
     pub(crate) joint: Option<RigName>,
+    /// Alternative to `joint`: the points between which it acts.
     pub(crate) linear: Option<LengthEntry>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// Friction and the like.
+/// Friction or another effect.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RigEffectEntry {
+    /// Name, by which variants replace it.
     pub(crate) name: Option<RigName>,
+    /// Kind of effect, by name.
     pub(crate) kind: RigName,
+    /// Names of its places.
     pub(crate) at: Spanned<Vec<RigName>>,
     #[serde(default)]
     pub(crate) values: BTreeMap<RigName, Spanned<f64>>,
@@ -160,11 +189,11 @@ pub(crate) struct RigEffectEntry {
     _note: Option<String>,
 }
 
-/// When samples are taken.
+/// Sampling of the recording.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SamplingEntry {
-    /// Samples per second.
+    /// Samples per second, Hz.
     pub(crate) rate: Option<Spanned<f64>>,
     /// Whether derivatives are written; by default they are if there is no encoder.
     pub(crate) derivatives: Option<bool>,
@@ -174,19 +203,23 @@ pub(crate) struct SamplingEntry {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SensorEntry {
+    /// Coordinates or drives that it measures.
     pub(crate) of: Spanned<Vec<RigName>>,
+    /// Standard deviation of white noise, in the unit of the quantity.
     pub(crate) noise: Option<Spanned<f64>>,
+    /// Smallest step of the reading, in the unit of the quantity.
     pub(crate) resolution: Option<Spanned<f64>>,
-    /// Steps per turn of an encoder, as a power of two.
+    /// Binary logarithm of the steps per revolution of an encoder.
     pub(crate) bits: Option<Spanned<u32>>,
-    /// A force that is read as a current.
+    /// A force that is measured by a current.
     pub(crate) current: Option<CurrentEntry>,
+    /// Delay of the reading, s.
     pub(crate) delay: Option<Spanned<f64>>,
     #[serde(rename = "note")]
     _note: Option<String>,
 }
 
-/// A force that is read as a current with a resolution of its own, A.
+/// A force that is measured by a current with its own resolution.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CurrentEntry {

@@ -1,4 +1,4 @@
-//! Kinds of joints: each as the functions of two bodies' poses that it holds.
+//! Kinds of joints: each is a set of functions of two bodies' poses that are constant.
 //!
 //! A place on both bodies and an axis in the base frame go in; the equations and the joint's own coordinate come
 //! out. Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), table 9.4.
@@ -8,16 +8,22 @@ use nalgebra::Vector3;
 use crate::pair::{BodyAnchor, PairFunction, PairQuantity};
 use crate::pose::{BodyMotion, BodyPose};
 
-/// What a joint allows.
+/// The motion that a joint allows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RigJointKind {
+    /// No motion.
     Fixed,
+    /// Rotation about the axis.
     Revolute,
+    /// Displacement along the axis.
     Prismatic,
+    /// Rotation about the axis and displacement along it.
     Cylindrical,
+    /// Rotation about the place.
     Spherical,
+    /// Displacement in the plane perpendicular to the axis, and rotation about the axis.
     Planar,
-    /// A point of the second body stays on a line of the first.
+    /// A point of the second body is on a line of the first.
     PointOnLine,
 }
 
@@ -35,6 +41,7 @@ impl RigJointKind {
 
     /// The kind of a name.
     pub(crate) fn from_name(name: &str) -> Option<Self> {
+        // In the order of `NAMES`.
         const KINDS: [RigJointKind; 7] = [
             RigJointKind::Fixed,
             RigJointKind::Revolute,
@@ -60,12 +67,17 @@ pub(crate) fn equations(
     poses: [BodyPose; 2],
 ) -> (Vec<(PairFunction, f64)>, Option<PairFunction>) {
     let (u, v) = perpendicular_axes(axis);
+    // `on` gives a direction of the base frame in the frame of either body.
     let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
     let pair = |shape| PairFunction { from, to, shape };
+    // The two places coincide.
     let coincident =
         || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
+    // The place on the second body is on the axis of the first.
     let on_line = || [&u, &v].map(|n| pair(PairQuantity::Along(on(0, n))));
+    // The axes of both bodies are parallel.
     let parallel = || [&u, &v].map(|n| pair(PairQuantity::Cosine(on(0, n), on(1, axis))));
+    // The bodies do not rotate relative to each other: three pairs of perpendicular directions.
     let locked = || {
         [(&u, &v), (&v, axis), (axis, &u)]
             .map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))))
@@ -106,7 +118,7 @@ pub(crate) fn equations(
     (held.into_iter().map(|pair| (pair, 0.0)).collect(), motion)
 }
 
-/// Makes a joint's coordinate have a value while the bodies are at `poses`.
+/// Sets the value that a joint's coordinate has while the bodies are at `poses`.
 pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[BodyPose]) {
     let bodies: Vec<BodyMotion> = poses
         .iter()
@@ -116,7 +128,7 @@ pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[Body
     let value = motion.derive(&bodies, &base).value;
     match &mut motion.shape {
         PairQuantity::Angle { offset, .. } => *offset += nominal - value,
-        // The anchor of the second body moves along the axis, where the joint leaves it free.
+        // The anchor of the second body moves along the axis, in which direction the joint is not constrained.
         PairQuantity::Along(axis) => {
             let turned = |body: Option<usize>| body.map_or(base.pose.q_WB, |b| poses[b].q_WB);
             let axis_W = turned(motion.from.body) * *axis;
@@ -126,7 +138,7 @@ pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[Body
     }
 }
 
-/// Two unit vectors across a unit vector and each other, a right-handed triad with it.
+/// Two unit vectors that form a right-handed triad with a unit vector.
 fn perpendicular_axes(axis: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let mut other = Vector3::zeros();
     other[axis.iamin()] = 1.0;

@@ -1,14 +1,14 @@
 //! Motion of all bodies from prescribed coordinates: Gauss-Newton on the joints' equations, rates and
 //! accelerations from their derivatives.
 //!
-//! The equations may be redundant, as those of parallel cranks are: each is kept, the least-squares solution
-//! of all is taken, and a residual says that they contradict each other.
+//! The equations may be redundant, as those of parallel cranks are. All of them are kept, their least-squares solution
+//! is used, and the residual shows whether they contradict each other.
 //! Along a trajectory an inverse is kept from pose to pose and solutions are refined (chord method).
-//! The QR decomposition with column pivoting reveals whether they determine the motion at all.
+//! The QR decomposition with column pivoting shows whether they determine the motion.
 //! Source: E. Haug, "Computer Aided Kinematics and Dynamics of Mechanical Systems" (1989), sections 3.6 and 9.6.
 //!
 //! Decision: a decomposition per Newton step took most of the time of a run. Only the residual decides whether a
-//! pose is met; slow progress requests a new inverse, whose rank is checked.
+//! pose is reached; slow progress requests a new inverse, whose rank is checked.
 
 use std::fmt;
 
@@ -19,17 +19,17 @@ use crate::pair::{PairDerivatives, PairFunction};
 use crate::pose::{BodyMotion, BodyPose};
 use crate::rig::Rig;
 
-/// Steps of Gauss-Newton before a pose is given up.
+/// Largest number of Gauss-Newton steps for a pose.
 const MOST_STEPS: usize = 40;
-/// A step below this, m or rad, ends the search: convergence is quadratic, and this is rounding.
+/// A shorter step, m or rad, ends the iteration: convergence is quadratic, and the rest is rounding.
 const SMALLEST_STEP: f64 = 1e-11;
-/// A step, or a refinement, that is not shorter than this share of the one before asks for a fresh inverse.
+/// A step, or a refinement, that is not shorter than this share of the one before requires a new inverse.
 const SLOWEST: f64 = 0.2;
 /// Rates are refined until their change is below this share.
 const REFINED: f64 = 1e-13;
-/// Joints may gape by this much, m or rad.
+/// Largest residual of a closed joint, m or rad.
 const LARGEST_GAP: f64 = 1e-9;
-/// A pivot below this share of the largest says that a body can move by itself.
+/// A pivot below this share of the largest means that a body can move by itself.
 const RANK_TOLERANCE: f64 = 1e-8;
 /// Coordinates move at most this far, m or rad, between two poses of a continuation.
 const CONTINUATION_STEP: f64 = 0.04;
@@ -45,29 +45,29 @@ pub struct RigState {
     pub qdd: Vec<f64>,
 }
 
-/// Why there is no motion for a state.
+/// Why a state has no motion.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RigPoseError {
     /// The joints cannot be closed with these values of the coordinates.
     OutOfReach {
-        /// The joint, or the coordinate, that gapes most.
+        /// The joint, or the coordinate, with the largest residual.
         at: String,
-        /// By how much, m or rad.
+        /// The residual, m or rad.
         gap: f64,
     },
-    /// The coordinates do not determine the motion: a singular pose, or a body that nothing holds.
+    /// The coordinates do not determine the motion: a singular pose, or a body without joints.
     Undetermined {
-        /// The body that is freest to move.
+        /// The body with the largest undetermined motion.
         body: String,
     },
-    /// There are more coordinates than the joints leave freedoms.
+    /// There are more coordinates than the joints leave degrees of freedom.
     TooManyCoordinates {
-        /// Freedoms.
+        /// Number of degrees of freedom.
         freedoms: usize,
-        /// Coordinates.
+        /// Number of coordinates.
         coordinates: usize,
     },
-    /// The drives cannot move the mechanism here: no forces of theirs balance a load.
+    /// The drives cannot balance a load at this pose.
     DrivesDeadlocked,
 }
 
@@ -76,13 +76,13 @@ impl fmt::Display for RigPoseError {
         match self {
             Self::OutOfReach { at, gap } => write!(
                 f,
-                "the joints do not close: `{at}` gapes by {gap:.2e}; keep the trajectory inside the workspace, and \
-                 check the points of this joint"
+                "the joints do not close: the gap at `{at}` is {gap:.2e}; keep the trajectory inside the workspace, \
+                 and check the points of this joint"
             ),
             Self::Undetermined { body } => write!(
                 f,
-                "joints and coordinates do not determine the motion: `{body}` is free to move; keep clear of \
-                 singular poses, or hold it by a joint"
+                "joints and coordinates do not determine the motion: `{body}` is free to move; avoid singular poses, \
+                 or fix it with a joint"
             ),
             Self::TooManyCoordinates {
                 freedoms,
@@ -94,7 +94,7 @@ impl fmt::Display for RigPoseError {
             ),
             Self::DrivesDeadlocked => write!(
                 f,
-                "the drives have no leverage here: no forces of theirs balance the load; keep clear of this pose"
+                "the drives cannot balance a load at this pose; avoid this pose"
             ),
         }
     }
@@ -112,28 +112,32 @@ pub struct RigMotion {
     pub(crate) rates_per_coordinate: DMatrix<f64>,
 }
 
-/// Follows a rig from pose to pose.
+/// Computes the motion of a rig from pose to pose.
 #[derive(Clone, Debug)]
 pub struct RigTracker<'r> {
+    /// The rig.
     rig: &'r Rig,
+    /// The base as a body at standstill.
     base: BodyMotion,
     /// The joints' equations with the names of their joints, then the coordinates.
     equations: Vec<(PairFunction, f64)>,
+    /// Name of the joint or coordinate of every equation.
     names: Vec<&'r str>,
-    /// Where the bodies were last, and the coordinates there.
+    /// Last poses of the bodies.
     poses: Vec<BodyPose>,
+    /// Coordinates at these poses, rad or m.
     last: Vec<f64>,
-    /// Rates per unit rate of each coordinate where bodies were last, from which the next pose is guessed.
+    /// Rates per unit rate of each coordinate at the last pose, from which the next pose is predicted.
     slopes: Option<DMatrix<f64>>,
-    /// Inverse of the gradient at some pose nearby.
+    /// Inverse of the gradient at a pose nearby.
     inverse: Option<GradientInverse>,
 }
 
 impl<'r> RigTracker<'r> {
-    /// Starts at the nominal configuration, closed exactly.
+    /// Starts at the nominal configuration, with all joints closed.
     ///
-    /// Fails when the joints do not close there, leave too few freedoms for the coordinates, or with them do not
-    /// determine the pose.
+    /// Fails if the joints do not close there, leave fewer degrees of freedom than coordinates, or do not determine the
+    /// pose together with these.
     pub fn new(rig: &'r Rig) -> Result<Self, RigPoseError> {
         let base = BodyMotion::at_standstill(BodyPose::identity());
         let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
@@ -170,8 +174,9 @@ impl<'r> RigTracker<'r> {
         Ok(tracker)
     }
 
-    /// More coordinates than freedoms would contradict each other as soon as the rig moves. The rank of the joints'
-    /// equations can only be lower at a special pose, so that this never refuses a sound rig.
+    /// Checks the number of coordinates: more coordinates than degrees of freedom would contradict each other as soon
+    /// as the rig moves. The rank of the joints' equations can only be lower at a special pose, so no valid rig is
+    /// refused.
     fn check_freedoms(&self) -> Result<(), RigPoseError> {
         let n = 6 * self.rig.bodies.len();
         let coordinates = self.last.len();
@@ -198,15 +203,15 @@ impl<'r> RigTracker<'r> {
         Ok(())
     }
 
-    /// Values of the coordinates at the pose where the tracker stands.
+    /// Values of the coordinates at the last pose.
     pub fn coordinates(&self) -> &[f64] {
         &self.last
     }
 
-    /// The motion of all bodies for a state near the last one, or anywhere that can be reached from there
+    /// The motion of all bodies for a state near the last one, or for any state that can be reached from there
     /// along a straight line in the coordinates.
     ///
-    /// Fails when the joints cannot be closed there or do not determine the motion.
+    /// Fails if the joints cannot be closed there or do not determine the motion.
     pub fn follow(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let far = state
             .q
@@ -219,7 +224,7 @@ impl<'r> RigTracker<'r> {
                     .wrapped_difference(*to, *from)
             })
             .fold(0.0, |most: f64, step| most.max(step.abs()));
-        // Small steps keep to the assembly in which the rig is drawn.
+        // Small steps stay in the assembly mode of the nominal configuration.
         let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
         let from = self.last.clone();
         let mut step = 1.0;
@@ -244,12 +249,13 @@ impl<'r> RigTracker<'r> {
         Ok(motion)
     }
 
-    /// Gauss-Newton from the last poses to those where joints are closed and coordinates have values `q`.
+    /// Gauss-Newton from the last poses to the poses with closed joints and coordinates `q`.
     ///
-    /// One inverse of the gradient serves as long as steps shrink fast with it: along a trajectory that saves
-    /// nearly all decompositions, and the residual, not the inverse, says when the pose is met.
+    /// One inverse of the gradient is used as long as steps shrink fast with it. Along a trajectory this saves
+    /// nearly all decompositions. The residual, not the inverse, decides whether the pose is reached.
     fn close_joints(&mut self, q: &[f64]) -> Result<(), RigPoseError> {
         let n_joint = self.equations.len() - q.len();
+        // The coordinates are the last equations.
         for (equation, value) in self.equations[n_joint..].iter_mut().zip(q) {
             equation.1 = *value;
         }
@@ -290,7 +296,7 @@ impl<'r> RigTracker<'r> {
             }
             if length < SMALLEST_STEP {
                 if outcome.1 > LARGEST_GAP {
-                    // An old inverse may be blind to this gap.
+                    // An old inverse may not see this residual.
                     if is_fresh {
                         break;
                     }
@@ -302,7 +308,7 @@ impl<'r> RigTracker<'r> {
                 q.clone_into(&mut self.last);
                 return Ok(());
             }
-            // A step over more than half a radian leaves the region where the gradient means anything.
+            // After a step of more than half a radian the gradient is no longer valid.
             if length > 0.5 {
                 step *= 0.5 / length;
                 last_length = f64::INFINITY;
@@ -312,7 +318,7 @@ impl<'r> RigTracker<'r> {
             is_fresh = false;
             displace(&mut poses, &step);
         }
-        // Whatever comes next starts afresh.
+        // The next pose starts with a new inverse.
         self.inverse = None;
         Err(RigPoseError::OutOfReach {
             at: outcome.0.to_owned(),
@@ -320,13 +326,13 @@ impl<'r> RigTracker<'r> {
         })
     }
 
-    /// Where the bodies will be about when the coordinates are `q`.
+    /// Prediction of the poses at coordinates `q`, to first order.
     fn predict_poses(&self, q: &[f64]) -> Vec<BodyPose> {
         let mut poses = self.poses.clone();
         if let Some(slopes) = &self.slopes {
             let measures = self.rig.coordinates.iter().map(|c| &c.measures);
             let steps = measures.zip(q).zip(&self.last);
-            // The sign: a correction is taken away.
+            // `displace` subtracts its step, so the sign is negative.
             let back = DMatrix::from_iterator(
                 q.len(),
                 1,
@@ -337,7 +343,7 @@ impl<'r> RigTracker<'r> {
         poses
     }
 
-    /// Rates and accelerations at the closed pose.
+    /// Rates and accelerations of all bodies at the closed pose.
     fn differentiate(&mut self, state: &RigState) -> Result<RigMotion, RigPoseError> {
         let n_equations = self.equations.len();
         let n_dof = state.q.len();
@@ -348,6 +354,7 @@ impl<'r> RigTracker<'r> {
             .map(|pose| BodyMotion::at_standstill(*pose))
             .collect();
         let derived = self.derive(&bodies);
+        // Unit rate of each coordinate, with the joints' equations constant.
         let mut unit = DMatrix::zeros(n_equations, n_dof);
         for k in 0..n_dof {
             unit[(n_joint + k, k)] = 1.0;
@@ -359,6 +366,7 @@ impl<'r> RigTracker<'r> {
             body.v_WB_W = part(rates.as_slice(), 6 * b);
             body.w_WB_W = part(rates.as_slice(), 6 * b + 3);
         }
+        // Accelerations: the joints' second derivatives are zero, and the coordinates' ones are prescribed.
         let mut right = DMatrix::zeros(n_equations, 1);
         for (i, derived) in self.derive(&bodies).iter().enumerate() {
             let prescribed = if i < n_joint {
@@ -379,7 +387,8 @@ impl<'r> RigTracker<'r> {
         })
     }
 
-    /// Solves `gradient x = right` by iterative refinement with the inverse at hand; a fresh one if that is slow.
+    /// Solves `gradient x = right` by iterative refinement with the present inverse; with a new one if that converges
+    /// slowly.
     fn solve(
         &mut self,
         derived: &[PairDerivatives],
@@ -422,6 +431,7 @@ impl<'r> RigTracker<'r> {
         product
     }
 
+    /// Values and derivatives of all equations.
     fn derive(&self, bodies: &[BodyMotion]) -> Vec<PairDerivatives> {
         self.equations
             .iter()
@@ -429,9 +439,10 @@ impl<'r> RigTracker<'r> {
             .collect()
     }
 
+    /// The inverse of the gradient; an error if the equations do not determine the motion of all bodies.
     fn invert(&self, derived: &[PairDerivatives]) -> Result<GradientInverse, RigPoseError> {
         let n = 6 * self.rig.bodies.len();
-        // Rows of zeros complete a matrix with too few equations; its rank then tells.
+        // Rows of zeros complete a matrix with too few equations, so that its rank shows this.
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(self.equations.len().max(n), n);
         for (i, ((pair, _), derived)) in self.equations.iter().zip(derived).enumerate() {
             derived.scatter(pair, |column, value| jacobian[(i, column)] += value);
@@ -456,7 +467,7 @@ impl<'r> RigTracker<'r> {
     }
 }
 
-/// The body that moves most in the direction that costs no equation anything.
+/// The body that moves most in the direction that violates the equations least.
 fn freest_body(jacobian: DMatrix<f64>) -> usize {
     let n = jacobian.ncols();
     if jacobian.iter().any(|x| !x.is_finite()) {

@@ -1,16 +1,16 @@
-//! A machine on the bench, in numbers: a rig file and a trajectory go in, a recording comes out.
+//! Numeric simulation of a real machine: a rig file and a trajectory go in, a recording comes out.
 //!
-//! Rigs stand in for hardware: whole machines with parallel cranks, rods, friction and sensors, against which
-//! reduced models are held. So nothing of their mechanics is shared with the mill: every body moves by itself,
-//! joints are equations between bodies, and all numbers are floats. The pipeline:
+//! Rigs replace hardware: complete machines with parallel cranks, rods, friction and sensors, with which reduced
+//! models are compared. So they share no mechanics with the derivation: every body moves by itself,
+//! joints are equations between bodies, and all numbers are doubles. The pipeline:
 //!
 //! 1. [`load_file`] - a rig file, checked;
 //! 2. [`Trajectory`] - coordinates over time;
-//! 3. [`Tracker`] - poses, rates and accelerations of all bodies, redundant loops included;
-//! 4. [`forces`] - what the drives must supply, with all effects;
+//! 3. [`RigTracker`] - poses, rates and accelerations of all bodies, with redundant loops;
+//! 4. [`forces`] - forces of the drives, with all effects;
 //! 5. [`simulate`] - the readings of the sensors.
 //!
-//! A [`Plant`] is the way back: forces of the drives go in, motion comes out, for controllers.
+//! A [`RigPlant`] is the forward dynamics, for controllers: forces of the drives go in, motion comes out.
 #![allow(
     non_snake_case,
     reason = "physical quantities carry their frames, as in p_WB_W"

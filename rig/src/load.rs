@@ -1,4 +1,4 @@
-//! Reads a rig file and those that it extends, and makes the rig that they describe.
+//! Reads a rig file and those that it extends, and assembles the rig that they describe.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::rig::Rig;
 /// Longest chain of variants.
 const LONGEST_CHAIN: usize = 8;
 
-/// A rig file that was read and found sound.
+/// A rig file that was read without errors.
 #[derive(Clone, Debug)]
 pub struct LoadedRig {
     /// What the file describes.
@@ -26,7 +26,7 @@ pub struct LoadedRig {
 
 /// Reads a rig file from disk, and those that it extends.
 ///
-/// Fails with findings about the files, each with its place and what to do.
+/// Fails with errors in the files, each with its place and a remedy.
 pub fn load_file(path: &Path) -> Result<LoadedRig, LoadFailure> {
     load_file_with(path, &DiskFiles::default())
 }
@@ -38,7 +38,7 @@ pub fn load_file_with(path: &Path, files: &dyn FileSource) -> Result<LoadedRig, 
     load(&path.to_string_lossy(), &text, files)
 }
 
-/// Reads a rig from its text; what it extends comes from `files`.
+/// Reads a rig from its text; files that it extends come from `files`.
 ///
 /// ```
 /// let text = r#"
@@ -50,10 +50,10 @@ pub fn load_file_with(path: &Path, files: &dyn FileSource) -> Result<LoadedRig, 
 ///     coordinate = [{ name = "q", joint = "hinge" }]
 ///     drive = [{ name = "motor", joint = "hinge" }]
 /// "#;
-/// let files = modelmill_boundary::files::Memory::default();
+/// let files = modelmill_boundary::files::MemoryFiles::default();
 /// let rig = modelmill_rig::load("pendulum.toml", text, &files)?.rig;
-/// let mut tracker = modelmill_rig::Tracker::new(&rig)?;
-/// let state = modelmill_rig::State { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
+/// let mut tracker = modelmill_rig::RigTracker::new(&rig)?;
+/// let state = modelmill_rig::RigState { q: vec![0.3], qd: vec![0.0], qdd: vec![0.0] };
 /// let torque = modelmill_rig::forces(&rig, &tracker.follow(&state)?)?[0];
 /// assert!((torque - 2.0 * 9.81 * 0.5 * 0.3_f64.cos()).abs() < 1e-12);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -116,7 +116,7 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
 
 /// Reads the tables of a TOML file; `file` is its index among the sources.
 ///
-/// Fails with the place of what does not fit.
+/// Fails with the place of the first entry that does not have the expected form.
 pub fn parse<T: serde::de::DeserializeOwned>(
     text: &str,
     file: usize,
@@ -124,7 +124,7 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     if text.len() > LARGEST_FILE {
         return Err(Box::new(plain_error(
             None,
-            "this file is too large to be meant",
+            "this file is too large to be read",
         )));
     }
     toml::from_str(text).map_err(|error| {
@@ -147,6 +147,7 @@ pub fn parse<T: serde::de::DeserializeOwned>(
     })
 }
 
+/// A failure with a single error.
 fn failure(sources: SourceFiles, found: Diagnostic) -> LoadFailure {
     LoadFailure {
         diagnostics: vec![found],
@@ -163,7 +164,7 @@ pub fn source_span(file: usize, range: &std::ops::Range<usize>) -> SourceSpan {
     }
 }
 
-/// An error without further words.
+/// An error with a message only: no label and no help.
 pub fn plain_error(span: Option<SourceSpan>, message: impl Into<String>) -> Diagnostic {
     Diagnostic {
         severity: DiagnosticSeverity::Error,

@@ -1,5 +1,5 @@
-//! Findings about a rig file, and the readers of its plain values: each takes an entry with its place and gives a
-//! sound value, or a stand-in and a finding.
+//! Errors in a rig file, and readers of its plain values: each takes an entry with its place and returns a
+//! valid value, or a replacement and an error.
 
 use modelmill_boundary::text::Message;
 use modelmill_spec::{Diagnostic, SourceSpan};
@@ -9,18 +9,20 @@ use crate::effect_by_name::name_list;
 use crate::file::{RigName, SpannedTriple};
 use crate::load::{plain_error, source_span};
 
-/// An entry with the file that it stands in.
+/// An entry with the file that contains it.
 pub(crate) struct FileItem<T> {
+    /// Index of the file among the sources.
     pub(crate) file: usize,
+    /// The entry.
     pub(crate) entry: T,
 }
 
-/// Collects findings about a file.
+/// Collects errors in a file.
 #[derive(Debug, Default)]
 pub struct RigLog(pub Vec<Diagnostic>);
 
 impl RigLog {
-    /// Takes an error at a place: what is wrong, what was expected there, what to do; the last two may be empty.
+    /// Adds an error at a place: what is wrong, what was expected there, what to do. The last two may be empty.
     pub fn error(&mut self, span: SourceSpan, message: String, label: &str, help: &str) {
         let help = Message::from(help);
         self.0.push(Diagnostic {
@@ -33,7 +35,8 @@ impl RigLog {
         });
     }
 
-    /// Takes a name that leads nowhere; `what` says what it should name, `known` what there is.
+    /// Adds an error for a name that does not exist. `what` is the kind of object that it should name, and `known`
+    /// lists the names.
     pub fn unknown_name(&mut self, file: usize, name: &RigName, what: &str, known: &[&str]) {
         self.error(
             source_span(file, &name.span()),
@@ -44,6 +47,7 @@ impl RigLog {
     }
 }
 
+/// A vector of finite numbers; zero if the entry is missing or not finite.
 pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLog) -> Vector3<f64> {
     let Some(entry) = entry else {
         return Vector3::zeros();
@@ -52,7 +56,7 @@ pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLo
     if !vector.iter().all(|x| x.is_finite()) {
         log.error(
             source_span(file, &entry.span()),
-            "this is not finite".to_owned(),
+            "this vector is not finite".to_owned(),
             "expected finite numbers",
             "",
         );
@@ -61,6 +65,7 @@ pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLo
     vector
 }
 
+/// A finite number above zero; 1 if the entry is anything else, which is an error. `what` names it in the error.
 pub(crate) fn above_zero(
     file: usize,
     entry: &toml::Spanned<f64>,
@@ -80,6 +85,7 @@ pub(crate) fn above_zero(
     1.0
 }
 
+/// A finite number of at least zero; 0 if the entry is missing, or anything else, which is an error.
 pub(crate) fn not_negative(
     file: usize,
     entry: Option<&toml::Spanned<f64>>,

@@ -1,4 +1,4 @@
-//! Scalar functions of the poses of two bodies: of these joints, coordinates and drives are made.
+//! Scalar functions of the poses of two bodies, of which joints, coordinates and drives consist.
 //!
 //! The motion of two bodies goes in; the function's value, its gradient with respect to the rates of both,
 //! and the part of its second derivative that does not depend on accelerations come out.
@@ -14,11 +14,11 @@ use crate::pose::BodyMotion;
 pub struct BodyAnchor {
     /// Index of the body; `None` is the base.
     pub body: Option<usize>,
-    /// Where in the body's frame, m.
+    /// Place in the body's frame, m.
     pub at: Vector3<f64>,
 }
 
-/// What is measured between two bodies; directions are unit vectors in the frame of their body.
+/// The quantity that is measured between two bodies; directions are unit vectors in the frame of their body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum PairQuantity {
     /// A component, along a direction of the base frame, of the vector between the anchors.
@@ -29,8 +29,11 @@ pub(crate) enum PairQuantity {
     Cosine(Vector3<f64>, Vector3<f64>),
     /// Angle about `axis`, from `x` of the first body to `x_to` of the second; counted from `offset`.
     Angle {
+        /// Axis, in the frame of the first body.
         axis: Vector3<f64>,
+        /// Direction of angle zero, in the frame of the first body.
         x: Vector3<f64>,
+        /// Direction that is measured, in the frame of the second body.
         x_to: Vector3<f64>,
         offset: f64,
     },
@@ -41,12 +44,15 @@ pub(crate) enum PairQuantity {
 /// A scalar function of the poses of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairFunction {
+    /// Place on the first body.
     pub(crate) from: BodyAnchor,
+    /// Place on the second body.
     pub(crate) to: BodyAnchor,
+    /// The quantity.
     pub(crate) shape: PairQuantity,
 }
 
-/// Value and derivatives of a [`Pair`]: `second derivative = gradient . accelerations + bias`.
+/// Value and derivatives of a [`PairFunction`]: `second derivative = gradient . accelerations + bias`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PairDerivatives {
     pub(crate) value: f64,
@@ -64,7 +70,7 @@ impl PairFunction {
         let d = two.pose.p_WB_W + r2 - one.pose.p_WB_W - r1;
         let dd = two.v_WB_W + two.w_WB_W.cross(&r2) - one.v_WB_W - one.w_WB_W.cross(&r1);
         let bias_of_d = two.centripetal(&r2) - one.centripetal(&r1);
-        // Gradient of `n . d` with n at rest.
+        // Gradient of `n . d` for a constant n.
         let along = |n: &Vector3<f64>| [-n, -r1.cross(n), *n, r2.cross(n)];
         match &self.shape {
             PairQuantity::Component(n) => PairDerivatives {
@@ -101,8 +107,8 @@ impl PairFunction {
                 x_to,
                 offset,
             } => {
-                // Exact where both axes agree, which the joint's own equations see to:
-                // there the axis' own rotation drops out of the second derivative.
+                // Exact if both axes agree, as the joint's own equations require:
+                // then the axis' own rotation has no effect on the second derivative.
                 let y = one.R_WB * axis.cross(x);
                 let (x, x_to, axis) = (one.R_WB * x, two.R_WB * x_to, one.R_WB * axis);
                 PairDerivatives {
@@ -113,7 +119,7 @@ impl PairFunction {
             }
             PairQuantity::Distance => {
                 let length = d.norm();
-                // At length zero there is no direction; zero gradient shows up as a missing rank.
+                // A distance of zero has no direction; its zero gradient appears as a missing rank.
                 let n = if length > 0.0 { d / length } else { d };
                 let rate = n.dot(&dd);
                 PairDerivatives {
@@ -140,7 +146,7 @@ impl PairFunction {
         matches!(self.shape, PairQuantity::Angle { .. })
     }
 
-    /// Wraps a difference of values: angles into half a turn to either side.
+    /// Difference of two values; for angles between -pi and pi.
     pub(crate) fn wrapped_difference(&self, value: f64, target: f64) -> f64 {
         let difference = value - target;
         if matches!(self.shape, PairQuantity::Angle { .. }) {

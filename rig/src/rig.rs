@@ -1,4 +1,4 @@
-//! A rig: bodies, joints, drives, effects and sensors, checked and ready to move.
+//! A rig: bodies, joints, drives, effects and sensors, checked and ready for simulation.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,7 +7,7 @@ use crate::pair::{BodyAnchor, PairFunction};
 use crate::pose::BodyPose;
 use crate::sensor::RigSensors;
 
-/// A full-body description of a machine. Made by [`crate::load`].
+/// A full-body description of a machine. [`crate::load`] reads one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rig {
     /// Name.
@@ -28,22 +28,22 @@ pub struct Rig {
     pub coordinates: Vec<RigCoordinate>,
     /// Drives, one per degree of freedom.
     pub drives: Vec<RigDrive>,
-    /// Friction and the like.
+    /// Friction and other effects.
     pub effects: Vec<RigEffect>,
-    /// What is measured, and how well.
+    /// Sampling and errors of the sensors.
     pub sensors: RigSensors,
-    /// Seed of the noise where the user gives none.
+    /// Seed of the noise, if the user requests none.
     pub seed: u64,
 }
 
 impl Rig {
-    /// The two points that a linear drive pushes apart; `None` for a drive in a joint.
+    /// The two points between which a linear drive acts; `None` for a drive in a joint.
     pub fn ends_of_drive(&self, drive: usize) -> Option<[BodyAnchor; 2]> {
         let pair = &self.drives.get(drive)?.measures;
         pair.is_distance().then_some([pair.from, pair.to])
     }
 
-    /// Where a revolute joint is on its two bodies; `None` for a joint of another kind.
+    /// The places of a revolute joint on its two bodies; `None` for other joints.
     pub fn hinge(&self, joint: usize) -> Option<[BodyAnchor; 2]> {
         let pair = self.joints.get(joint)?.motion.as_ref()?;
         pair.is_angle().then_some([pair.from, pair.to])
@@ -67,7 +67,7 @@ impl Rig {
 pub struct RigBody {
     /// Name.
     pub name: String,
-    /// Where its frame is in the nominal configuration.
+    /// Pose of its frame in the nominal configuration.
     pub nominal: BodyPose,
     /// Mass, kg.
     pub mass: f64,
@@ -77,12 +77,12 @@ pub struct RigBody {
     pub inertia: Matrix3<f64>,
 }
 
-/// A named place.
+/// A named place on a body or on the base.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigPoint {
     /// Name.
     pub name: String,
-    /// Where it is.
+    /// The place.
     pub anchor: BodyAnchor,
 }
 
@@ -91,21 +91,21 @@ pub struct RigPoint {
 pub struct RigLumpedMass {
     /// Mass, kg.
     pub mass: f64,
-    /// Where the balance of forces sees it.
+    /// The place where it acts in the balance of forces.
     pub at: BodyAnchor,
-    /// Where the balance of moments about the body's frame sees it, in the body's frame; a real mass is seen
-    /// at one place by both. Some reduced models split the two, and a rig can copy them.
+    /// The place, in the body's frame, m, where it acts in the balance of moments about the body's frame. For a real
+    /// mass both places are the same. Some reduced models use two places, and a rig can copy them.
     pub moment_at: Vector3<f64>,
 }
 
-/// A joint as the equations that it holds.
+/// A joint as the equations that it imposes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigJoint {
     /// Name.
     pub name: String,
-    /// Functions of the poses, each with the value that it keeps.
+    /// Functions of the poses, each with its constant value.
     pub(crate) equations: Vec<(PairFunction, f64)>,
-    /// Its coordinate, where it has exactly one: an angle or a displacement.
+    /// Its coordinate, if it has exactly one: an angle or a displacement.
     pub(crate) motion: Option<PairFunction>,
 }
 

@@ -1,4 +1,4 @@
-//! Sensors: what an ideal motion looks like when it is measured.
+//! Sensors: the errors of measurements of an exact motion.
 //!
 //! An exact value goes in, noise is added and the sum is rounded to the sensor's resolution, in this order:
 //! noise arises before the counter or the converter.
@@ -8,9 +8,9 @@ use crate::noise::GaussianNoise;
 /// All sensors of a rig.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RigSensors {
-    /// Samples per second; the trajectory's own times if there is none.
+    /// Samples per second, Hz; `None` for the times of the trajectory.
     pub rate: Option<f64>,
-    /// Whether derivatives of the coordinates are written, exact ones; real encoders give none.
+    /// Whether exact derivatives of the coordinates are written; real encoders have none.
     pub derivatives: bool,
     /// One per coordinate of the rig.
     pub encoders: Vec<SensorChannel>,
@@ -25,12 +25,12 @@ pub struct SensorChannel {
     pub noise: f64,
     /// Smallest step of the reading, in the unit of the quantity.
     pub resolution: f64,
-    /// What is read at a time is the quantity this much earlier, s.
+    /// Delay, s: the reading at a time is the quantity of this much earlier.
     pub delay: f64,
 }
 
 impl SensorChannel {
-    /// Reads a value.
+    /// The reading of a value.
     pub fn read(&self, value: f64, noise: &mut GaussianNoise) -> f64 {
         let mut reading = value;
         if self.noise > 0.0 {

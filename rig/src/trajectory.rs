@@ -15,7 +15,9 @@ const STENCIL: usize = 5;
 /// A prescribed motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
+    /// Times, s, increasing.
     time: Vec<f64>,
+    /// Samples of every coordinate, with all derivatives.
     coordinates: Vec<CoordinateSamples>,
 }
 
@@ -24,13 +26,13 @@ pub struct Trajectory {
 pub struct CoordinateSamples {
     /// Values, rad or m.
     pub q: Vec<f64>,
-    /// Rates; differences of the values if there are none.
+    /// Rates; if missing, finite differences of the values are used.
     pub qd: Option<Vec<f64>>,
-    /// Accelerations; differences of the rates, or of the values, if there are none.
+    /// Accelerations; if missing, finite differences of the rates, or else of the values, are used.
     pub qdd: Option<Vec<f64>>,
 }
 
-/// Why columns make no trajectory.
+/// Why columns do not form a trajectory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrajectoryError {
     /// There is no sample.
@@ -45,7 +47,7 @@ pub enum TrajectoryError {
         /// Index of the coordinate.
         coordinate: usize,
     },
-    /// Derivatives are missing and there are too few samples to find them.
+    /// Derivatives are missing, and there are too few samples to compute them.
     TooShort,
 }
 
@@ -60,13 +62,13 @@ impl fmt::Display for TrajectoryError {
             ),
             Self::Faulty { coordinate } => write!(
                 f,
-                "the columns of coordinate {} are not finite numbers, one per time",
+                "the columns of coordinate {} do not have one finite number per time",
                 coordinate + 1
             ),
             Self::TooShort => write!(
                 f,
-                "derivatives are missing, and finding them takes at least {STENCIL} samples; give the columns with \
-                 `_d` and `_dd`"
+                "derivatives are missing, and computing them takes at least {STENCIL} samples; add samples, or the \
+                 columns with `_d` and `_dd`"
             ),
         }
     }
@@ -77,7 +79,7 @@ impl std::error::Error for TrajectoryError {}
 impl Trajectory {
     /// From times, s, and one entry per coordinate.
     ///
-    /// Fails when times do not grow, lengths differ, or derivatives cannot be found.
+    /// Fails if times do not increase, lengths differ, or derivatives cannot be computed.
     pub fn new(
         time: Vec<f64>,
         coordinates: Vec<CoordinateSamples>,
@@ -117,9 +119,9 @@ impl Trajectory {
         })
     }
 
-    /// From times, s, and a function that gives the state at each; a Fourier series, say.
+    /// From times, s, and a function that returns the state at each, for example a Fourier series.
     ///
-    /// Fails when times do not grow or a state is not finite.
+    /// Fails if times do not increase or a state is not finite.
     pub fn from_function(
         time: Vec<f64>,
         state: impl Fn(f64) -> RigState,
@@ -141,7 +143,7 @@ impl Trajectory {
         Self::new(time, samples)
     }
 
-    /// Times of the samples, s; at least one, growing.
+    /// Times of the samples, s; at least one, increasing.
     pub fn time(&self) -> &[f64] {
         &self.time
     }
@@ -151,11 +153,11 @@ impl Trajectory {
         self.coordinates.len()
     }
 
-    /// The state at a time; before the first and after the last sample the outermost polynomial goes on.
+    /// The state at a time; before the first and after the last sample the nearest polynomial is continued.
     pub fn state_at(&self, t: f64) -> RigState {
         let n = self.time.len();
         let after = self.time.partition_point(|sample| *sample <= t);
-        // At a sample its own numbers are the answer, bit for bit.
+        // At a sample its own numbers are returned, bit for bit.
         if after > 0 && self.time[after - 1].to_bits() == t.to_bits() {
             return self.sample(after - 1);
         }
@@ -176,6 +178,7 @@ impl Trajectory {
         state
     }
 
+    /// The state at sample `i`.
     fn sample(&self, i: usize) -> RigState {
         let of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |column| column[i]);
         RigState {
@@ -186,9 +189,9 @@ impl Trajectory {
     }
 }
 
-/// Value and two derivatives, at `s` between 0 and 1, of the polynomial with given ones at both ends.
+/// Value and two derivatives, at `s` between 0 and 1, of the polynomial of degree five with given ones at both ends.
 fn quintic_hermite(left: [f64; 3], right: [f64; 3], s: f64) -> [f64; 3] {
-    // Around the left end: c0..c2 are its own, c3..c5 meet the right end.
+    // Around the left end: c0..c2 are its values, and c3..c5 are determined by the right end.
     let [c0, c1, c2] = [left[0], left[1], 0.5 * left[2]];
     let value = right[0] - c0 - c1 - c2;
     let rate = right[1] - c1 - 2.0 * c2;

@@ -1,13 +1,13 @@
 //! Variables of an emitted program, so that it reads as its equations do: `0.5 * r_x + r_y * x1`.
 //!
-//! A product waits until something is done with it: added to something else, both become one instruction where the machine
-//! has such and rounds once.
+//! A product is kept unevaluated until its next operation. If it is added to something, both become one instruction
+//! where the machine has a fused multiply-add, which rounds once.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::Real;
 
-/// What a variable holds: one number, or as many as a vector of the machine.
+/// Type of a variable: one number, or as many as a vector register of the machine takes.
 pub trait ProgramValue:
     Copy
     + Add<Output = Self>
@@ -25,7 +25,7 @@ pub trait ProgramValue:
     /// Absolute value.
     #[must_use]
     fn abs(self) -> Self;
-    /// -1, 0 or 1; what is no number stays what it is.
+    /// -1, 0 or 1; NaN stays NaN.
     #[must_use]
     fn sign(self) -> Self;
     /// Hyperbolic tangent.
@@ -97,11 +97,11 @@ impl<T: Real> ProgramValue for T {
 #[derive(Clone, Copy, Debug)]
 pub struct Var<V>(pub V);
 
-/// A product of two variables that waits for what is done with it.
+/// A product of two variables that is kept unevaluated until its next operation.
 #[derive(Clone, Copy, Debug)]
 pub struct DeferredProduct<V>(V, V);
 
-/// A variable, or what has been made of some.
+/// An operand of the arithmetic: a variable, or an expression of variables.
 pub trait Term<V>: Copy {
     /// Its value.
     fn get(self) -> V;
@@ -154,7 +154,7 @@ macro_rules! terms {
             functions! {
                 sqrt "Square root."
                 abs "Absolute value."
-                sign "-1, 0 or 1; what is no number stays what it is."
+                sign "-1, 0 or 1; NaN stays NaN."
                 tanh "Hyperbolic tangent."
                 exp "Exponential."
             }
@@ -212,7 +212,7 @@ operators! {
     DeferredProduct Div::div DeferredProduct = Var, |a, b| Var(a.get() / b.get());
 }
 
-/// The same where one side is a number that stands in the program.
+/// The same where one side is a literal number of the program.
 macro_rules! with_numbers {
     ($($term:ident)*) => {$(
         with_numbers! { $term Add::add = Var, |a, b| a + b }
@@ -248,7 +248,7 @@ with_numbers! { Var DeferredProduct }
 mod tests {
     use super::*;
 
-    /// Every operator on every pair of terms, beside plain arithmetic; all results are exact.
+    /// Every operator on every pair of terms agrees with plain arithmetic; all results are exact.
     #[test]
     fn terms_compute_as_numbers_do() {
         let [a, b, c, d] = [3.0, 5.0, 7.0, 11.0_f64];

@@ -1,9 +1,9 @@
 //! Programs over many states at once: structure of arrays in, structure of arrays out.
 //!
-//! States go through in lines of one cache line each (8 `f64`, 16 `f32`). With the feature `std` the program runs in the
-//! widest vectors of the machine, which is asked at run time (`wide`); without it, one state at a time. A line in
-//! which anything is out of the ordinary, such as a number that is none, a pose that is out of reach or an angle of more
-//! than 16 000 turns, is looked at again one by one: so there is one definition of what is wrong, that of one state.
+//! States are processed in lines of one cache line each (8 `f64`, 16 `f32`). With the feature `std` the program runs in
+//! the widest vectors of the machine, which are detected at run time (`wide`); without it, one state at a time. If a
+//! line contains an exception, such as NaN, a pose out of reach or an angle of more than 16 000 turns, its states are
+//! evaluated again one by one. So there is one definition of an error, that of a single state.
 
 use core::fmt;
 
@@ -14,10 +14,10 @@ pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     /// Names of the inputs.
     const NAMES: [&'static str; INPUTS];
 
-    /// Runs the program for as many states as `numbers` holds in a value.
+    /// Runs the program for as many states as a value of `numbers` contains.
     ///
     /// # Errors
-    /// What is wrong with the pose.
+    /// A pose error of the model.
     fn run<N: crate::Numbers<Scalar = T>>(
         &self,
         numbers: &N,
@@ -25,10 +25,11 @@ pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
         outputs: &mut impl OutputSink<N::Value>,
     ) -> Result<(), PoseError>;
 
-    /// Finds inputs that follow from the others, for one state after the other; `last` holds those of the state before.
+    /// Computes inputs that depend on the others, for one state after the other; `last` are those of the previous
+    /// state.
     ///
     /// # Errors
-    /// What is wrong with the pose.
+    /// A pose error of the model.
     fn complete(
         &self,
         _inputs: &mut [T; INPUTS],
@@ -37,7 +38,7 @@ pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
         Ok(())
     }
 
-    /// How many of the last inputs [`Self::complete`] finds; their slices come in empty.
+    /// How many of the last inputs [`Self::complete`] computes; their slices are passed in empty.
     const COMPLETED: usize = 0;
 }
 
@@ -45,7 +46,7 @@ pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
 pub trait CacheLine<T>: Copy + AsRef<[T]> + AsMut<[T]> {
     /// How many numbers.
     const LENGTH: usize;
-    /// The same number throughout.
+    /// A line in which all numbers are `x`.
     fn splat(x: T) -> Self;
 }
 
@@ -82,30 +83,31 @@ macro_rules! line {
 line!(Line64, f64, 8);
 line!(Line32, f32, 16);
 
-/// Numbers that programs can take many of at once; `f32` and `f64` are.
+/// Scalar types that programs can process in blocks; implemented for `f32` and `f64`.
 pub trait BlockScalar: Real {
-    /// A cache line of them.
+    /// A cache line of these numbers.
     type Line: CacheLine<Self>;
 
     /// Runs a job in the widest vectors of the machine.
     ///
     /// # Errors
-    /// What the job finds wrong.
+    /// The error of the job.
     fn run_job<J: VectorJob<Self>>(job: J) -> Result<(), BlockError>;
 }
 
-/// What runs inside vectors of one width.
+/// A job that runs with vectors of one width.
 pub trait VectorJob<T: BlockScalar> {
-    /// Does it all; `vectors` runs a program over a line.
+    /// Runs the job; `vectors` runs a program over a line.
     ///
     /// # Errors
-    /// What is found wrong.
+    /// The error of the job.
     fn run_vectors<V: VectorWidth<T>>(self, vectors: V) -> Result<(), BlockError>;
 }
 
 /// Vectors of one width, and the instructions for them.
 pub trait VectorWidth<T: BlockScalar>: Copy {
-    /// Runs a program over the line of states that starts `at` a place of the inputs; whether every lane was regular.
+    /// Runs a program over the line of states that starts at index `at` of the inputs; returns whether every lane was
+    /// regular.
     fn run_line<P: StateProgram<T, INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         self,
         program: &P,
@@ -115,7 +117,7 @@ pub trait VectorWidth<T: BlockScalar>: Copy {
     ) -> bool;
 }
 
-/// One state after the other.
+/// No vectors: one state after the other.
 #[derive(Clone, Copy, Debug)]
 pub struct ScalarWidth;
 
@@ -128,7 +130,7 @@ impl<T: BlockScalar> VectorWidth<T> for ScalarWidth {
         _at: usize,
         _outputs: &mut [T::Line; OUTPUTS],
     ) -> bool {
-        // Every line is looked at one by one.
+        // Reported as irregular, so that every line is evaluated one by one.
         false
     }
 }
@@ -152,14 +154,14 @@ mod singly {
     }
 }
 
-/// Why many states have no answer.
+/// Why an evaluation over many states failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BlockError {
-    /// At a state, the first of those that have none.
+    /// The first state without an answer.
     At {
-        /// Which state.
+        /// Index of the state.
         sample: usize,
-        /// Why.
+        /// The pose error at this state.
         reason: PoseError,
     },
     /// Arrays of different lengths.
@@ -191,23 +193,23 @@ impl fmt::Display for BlockError {
 
 impl core::error::Error for BlockError {}
 
-/// The states of one line, and what a program says of them.
+/// The states of one line, and the outputs of a program for them.
 #[derive(Clone, Copy, Debug)]
 pub struct StateBlock<'a, L, const OUTPUTS: usize> {
     /// Number of the first state.
     pub first: usize,
-    /// How many states; what stands behind them in each line means nothing.
+    /// How many states; entries of a line beyond this number have no meaning.
     pub len: usize,
     /// One line per output.
     pub outputs: &'a [L; OUTPUTS],
 }
 
-/// What is done with the results of a line.
+/// Consumer of the results of a line.
 trait BlockVisitor<L, const OUTPUTS: usize> {
     fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>);
 }
 
-/// A function that looks at them.
+/// A function that receives the results.
 struct FunctionVisitor<F>(F);
 
 impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
@@ -219,7 +221,7 @@ impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor
     }
 }
 
-/// Columns that they are written to.
+/// Columns that the results are written to.
 struct ColumnVisitor<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
 
 impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
@@ -247,11 +249,11 @@ impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
     }
 }
 
-/// Runs a program over states, one slice per input, and shows the outputs line by line.
+/// Runs a program over states, one slice per input, and passes the outputs on line by line.
 ///
 /// # Errors
-/// Slices of different lengths, before anything runs; else the first state without an answer, after all before it have
-/// been shown.
+/// Slices of different lengths, before anything runs; else the first state without an answer, after all lines before it
+/// have been passed on.
 pub fn visit_blocks<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
     inputs: &[&[T]; INPUTS],
@@ -369,7 +371,7 @@ fn same_length(
     })
 }
 
-/// All states, line by line.
+/// Evaluates all states, line by line.
 struct LineJob<'a, T, P, F, const INPUTS: usize, const OUTPUTS: usize> {
     program: &'a P,
     inputs: &'a [&'a [T]; INPUTS],
@@ -396,7 +398,8 @@ where
         while first < self.n {
             let mut fault = None;
             let left = self.n - first;
-            // Whole lines are read where they are; the last one is filled up, and what is completed needs a place.
+            // Full lines are read in place. The last one is filled up in a buffer, as are lines whose inputs are
+            // completed.
             let (inputs, len): ([&[T]; INPUTS], usize) =
                 if P::COMPLETED == 0 && left >= T::Line::LENGTH {
                     let len = left - left % T::Line::LENGTH;
@@ -460,12 +463,12 @@ fn load_line<T: BlockScalar>(line: &mut T::Line, array: &[T], first: usize, len:
     }
 }
 
-/// State `k` of some.
+/// State `k`: one entry of each input.
 fn state_at<T: BlockScalar, const INPUTS: usize>(inputs: &[&[T]; INPUTS], k: usize) -> [T; INPUTS] {
     inputs.map(|input| input.get(k).copied().unwrap_or(T::from_f64(0.0)))
 }
 
-/// Completes the inputs of a line; which state has none, and why.
+/// Completes the inputs of a line; on failure returns which state failed, and why.
 #[inline(never)]
 fn complete_line<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
@@ -483,7 +486,7 @@ where
         }
         let given = INPUTS.saturating_sub(P::COMPLETED);
         for (line, value) in inputs.iter_mut().zip(&state).skip(given) {
-            // What lies behind the last state resembles it.
+            // Lanes behind the last state repeat it, so that they raise no error.
             for to in line.as_mut().iter_mut().skip(k) {
                 *to = *value;
             }
@@ -493,7 +496,8 @@ where
     Ok(())
 }
 
-/// `len` states of a line that starts `at` a place, one after the other: which one of them has no answer, and why.
+/// Evaluates the `len` states of a line that starts at index `at`, one after the other; returns which one fails, and
+/// why.
 #[cold]
 #[inline(never)]
 fn run_each_state<T: BlockScalar, P, const INPUTS: usize, const OUTPUTS: usize>(

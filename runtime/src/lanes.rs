@@ -1,10 +1,10 @@
-//! Sine and cosine of many angles at once: arrays go in, arrays come out, without a branch or a call inside the loop, so
-//! that the compiler turns it into vectors of whatever width the caller is compiled for.
+//! Sine and cosine of many angles at once: arrays in, arrays out, without a branch or a call inside the loop, so that
+//! the compiler can vectorise it for any width.
 //!
 //! Argument reduction in three parts of pi/2 and polynomials on [-pi/4, pi/4] after K. C. Ng's `k_sin.c`, `k_cos.c` and
-//! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles up
-//! to [`LARGEST_ANGLE`]; arrays with a larger one, or with one that is no finite number, go through
-//! [`Real::sin_cos`](crate::Real::sin_cos) one by one.
+//! `e_rem_pio2.c` of FDLIBM 5.3 (Sun Microsystems, 1993; freely distributable). The error stays below 1 ulp for angles
+//! up to [`LARGEST_ANGLE`]; arrays with a larger or non-finite angle go through [`Real::sin_cos`](crate::Real::sin_cos)
+//! one by one.
 //!
 //! Decision: one sine and cosine serve single numbers and vectors, with and without the standard library.
 //! Polynomials are summed in pairs of terms (G. Estrin), which shortens the dependent chain. One state computes
@@ -39,7 +39,8 @@ pub fn sin_cos_lanes<const N: usize>(angle: &[f64; N], sin: &mut [f64; N], cos: 
     }
 }
 
-/// Sines and cosines of several angles, rad: one branch for all of them, and pairs in the vectors that every machine has.
+/// Sines and cosines of several angles, rad: one branch for all of them, and pairs in the vectors that every machine
+/// has.
 #[inline]
 pub(crate) fn sin_cos_each<const N: usize>(angles: [f64; N]) -> ([f64; N], [f64; N]) {
     let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
@@ -59,7 +60,7 @@ pub(crate) fn sin_cos_once(angle: f64) -> (f64, f64) {
 
 /// A number, or a vector of numbers, that the kernel below works on.
 pub(crate) trait LaneAngle: ProgramValue {
-    /// Sine and cosine after as many quarter turns as stand in the lowest bits of `shifted`.
+    /// Sine and cosine after a rotation by the number of quarter turns in the lowest bits of `shifted`.
     fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self);
 }
 
@@ -89,7 +90,7 @@ impl LaneAngle for f64 {
 )]
 #[inline(always)]
 pub(crate) fn reduced_sin_cos<A: LaneAngle>(x: A) -> (A, A) {
-    // Adding and subtracting 1.5 * 2^52 rounds to a whole number, which then stands in the lowest bits.
+    // Adding and subtracting 1.5 * 2^52 rounds to an integer, which is then in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     const PIO2_1: f64 = 1.570_796_326_734_125_614_17;
     const PIO2_2: f64 = 6.077_100_506_303_965_976_60e-11;

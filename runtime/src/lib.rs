@@ -1,4 +1,5 @@
-//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on loops.
+//! What emitted models need at run time: a trait for `f32` and `f64`, the errors of a pose, and Newton's method on
+//! loops.
 //!
 //! There is no allocation and no unsafe code here, and without the feature `std` no standard library either.
 //!
@@ -16,6 +17,7 @@ mod model;
 mod numbers;
 #[cfg(feature = "rayon")]
 mod parallel;
+mod random;
 mod reactions;
 mod real;
 mod self_test;
@@ -37,6 +39,7 @@ pub use model::{
     State, accelerations, check_base, check_block_input, run_checked, run_unchecked,
 };
 pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
+pub use random::{RandomBits, scramble_bits};
 pub use reactions::{ClosedLoop, Joint, Wrench};
 pub use real::Real;
 pub use self_test::{Random, SelfTestError, ShowRows, self_test};
@@ -60,8 +63,8 @@ pub enum PoseError {
     Singular,
     /// A term of the model, such as an effect of its own, has no finite value there.
     Undefined,
-    /// An input is no number, or larger than [`Real::largest`]; its name in the model file, with `_d` and `_dd` for rates
-    /// and accelerations.
+    /// An input is NaN, infinite or larger than [`Real::largest`]. Contains its name in the model file, with `_d` and
+    /// `_dd` for rates and accelerations.
     NotFinite(&'static str),
 }
 
@@ -70,9 +73,9 @@ impl fmt::Display for PoseError {
         match self {
             Self::OutOfReach => f.write_str("the loops cannot close: the pose is out of reach"),
             Self::Singular => f.write_str("the pose is singular"),
-            Self::Undefined => f.write_str("a term of the model has no finite value there"),
+            Self::Undefined => f.write_str("a term of the model has no finite value at this state"),
             Self::NotFinite(input) => {
-                write!(f, "`{input}` is no number, or too large to compute with")
+                write!(f, "`{input}` is NaN, infinite or too large to compute with")
             }
         }
     }
@@ -80,10 +83,10 @@ impl fmt::Display for PoseError {
 
 impl core::error::Error for PoseError {}
 
-/// Names the first of some inputs that is no number, or larger than [`Real::largest`].
+/// Checks that inputs are finite and not larger than [`Real::largest`].
 ///
 /// # Errors
-/// [`PoseError::NotFinite`] with its name.
+/// [`PoseError::NotFinite`] with the name of the first that is not.
 #[inline]
 pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(), PoseError> {
     // One branch for all of them.

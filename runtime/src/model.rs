@@ -1,4 +1,4 @@
-//! What emitted models are made of whatever they model: states, motion, and how a program is called.
+//! What all emitted models have in common: states, motion, and how a program is called.
 
 use crate::blocks::{BlockError, StateProgram};
 use crate::{
@@ -19,7 +19,7 @@ pub struct State<V, const ACTIVE: usize> {
     pub qdd: [V; ACTIVE],
 }
 
-/// Motion of the independent coordinates where friction depends on what the drives carry.
+/// Motion of the independent coordinates, for models whose friction depends on the load of the drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadedState<V, const ACTIVE: usize, const DRIVES: usize> {
     /// Coordinates.
@@ -39,7 +39,7 @@ pub struct Drives<T, const ACTIVE: usize, const DRIVES: usize> {
     pub coordinate: [T; DRIVES],
     /// Their rates.
     pub rate: [T; DRIVES],
-    /// Derivatives of the lengths by the independent coordinates.
+    /// Derivatives of the drive coordinates by the independent coordinates.
     pub jacobian: [[T; ACTIVE]; DRIVES],
 }
 
@@ -167,7 +167,7 @@ impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> ZeroedOutputs<T>
 /// Runs a program for one state.
 ///
 /// # Errors
-/// An input that is no number or too large, or what is wrong with the pose.
+/// An input that is NaN or too large, or a pose error of the model.
 #[inline]
 pub fn run_checked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
@@ -184,7 +184,7 @@ where
     Ok(results)
 }
 
-/// Runs a program that asks nothing of its inputs.
+/// Runs a program that does not check its inputs.
 #[inline]
 pub fn run_unchecked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
     program: &P,
@@ -196,12 +196,12 @@ where
     R: ZeroedOutputs<T>,
 {
     let mut results = R::zeros();
-    // There is nothing in it that could fail.
+    // Nothing in such a program can fail.
     _ = program.run(&crate::ScalarNumbers::new(), inputs.map(Var), &mut results);
     results
 }
 
-/// What a program sees: its inputs and its arithmetic, and where its results go.
+/// Interface of the runtime to a program: its inputs, its arithmetic, and the destination of its results.
 pub trait Run<T: Real, const INPUTS: usize>: crate::Numbers<Scalar = T> {
     /// The inputs.
     fn inputs(&self) -> [Var<Self::Value>; INPUTS];
@@ -209,7 +209,7 @@ pub trait Run<T: Real, const INPUTS: usize>: crate::Numbers<Scalar = T> {
     fn put(&mut self, k: usize, value: impl Term<Self::Value>);
 }
 
-/// A program that runs.
+/// Inputs, arithmetic and destination of one run of a program.
 #[derive(Debug)]
 pub struct ProgramRun<'a, N: crate::Numbers, O, const INPUTS: usize> {
     /// The arithmetic.
@@ -276,7 +276,7 @@ where
     }
 }
 
-/// A method of an emitted struct as a program that the runtime runs.
+/// Makes a method of an emitted struct a program that the runtime can run.
 #[macro_export]
 macro_rules! program {
     ($item:ident, $owner:ident, $method:ident, $names:expr, $inputs:expr, $outputs:expr) => {
@@ -302,9 +302,10 @@ macro_rules! program {
     };
 }
 
-/// A struct of named quantities with the table of their names, units and values in the model file, which are its default.
+/// A struct of named quantities with the table of their names, units and values in the model file, which are its
+/// default.
 ///
-/// `as` gives the name in the model file where Rust cannot have it.
+/// `as` gives the name in the model file where that name is not a valid Rust identifier.
 #[macro_export]
 macro_rules! record {
     ($(#[$doc:meta])* $record:ident, $table:ident:) => {
@@ -350,7 +351,7 @@ macro_rules! record {
 
         #[allow(dead_code)]
         impl<T: $crate::Real> $record<T> {
-            /// Names the first that is no number, or too large to compute with.
+            /// Returns an error with the name of the first value that is NaN or too large to compute with.
             fn check(&self) -> Result<(), $crate::PoseError> {
                 $crate::check_finite(&[$(self.$field),+], &$table.map(|quantity| quantity.name))
             }
@@ -386,7 +387,7 @@ macro_rules! values {
     };
 }
 
-/// Variables of what a program computed, in an array.
+/// Variables of computed values, in an array.
 #[macro_export]
 macro_rules! variables {
     ($($term:expr),* $(,)?) => {
@@ -397,7 +398,7 @@ macro_rules! variables {
 /// Accelerations of the independent coordinates: `M q'' = J' f - bias`.
 ///
 /// # Errors
-/// A force that is no number or too large, or a mass matrix that is singular.
+/// A force that is NaN or too large, or a mass matrix that is singular.
 pub fn accelerations<T: Real, const ACTIVE: usize, const DRIVES: usize>(
     mut mass_matrix: [[T; ACTIVE]; ACTIVE],
     bias: &Linearisation<T, ACTIVE, DRIVES>,
@@ -418,7 +419,7 @@ pub fn accelerations<T: Real, const ACTIVE: usize, const DRIVES: usize>(
     Ok(accelerations)
 }
 
-/// A model whose passive coordinates are found by Newton's method.
+/// A model whose passive coordinates are computed by Newton's method.
 pub trait Assembly: Loops {
     /// How many passive coordinates there are.
     const N_PASSIVE: usize;
@@ -429,17 +430,18 @@ pub trait Assembly: Loops {
     /// Passive coordinates of the nominal pose.
     ///
     /// # Errors
-    /// A geometry that is no number, or cannot be put together.
+    /// A geometry that is not finite, or whose loops cannot be closed.
     fn nominal_passive(&self) -> Result<Self::Passive, PoseError>;
 
     /// Names of the independent coordinates.
     fn names(&self) -> &'static [&'static str];
 
-    /// Passive coordinates of a pose, in the assembly mode of the nominal pose, followed from there in a straight line of
-    /// the independent coordinates: three to five steps of Newton's method for every half radian.
+    /// Passive coordinates of a pose, in the assembly mode of the nominal pose. They are followed from there along a
+    /// straight line of the independent coordinates, with three to five steps of Newton's method for every half radian.
     ///
     /// # Errors
-    /// A pose that is out of reach, or cannot be followed from the nominal one, or is singular, or is no number.
+    /// A pose that is out of reach, that cannot be followed from the nominal one, that is singular, or that is not
+    /// finite.
     fn passive_position(&self, q: &Self::Active) -> Result<Self::Passive, PoseError>
     where
         Self: Sized,
@@ -449,9 +451,9 @@ pub trait Assembly: Loops {
         follow(self, &self.nominal_active(), &nominal, q)
     }
 
-    /// Passive coordinates of a pose, from those of a pose near by: for control, of the last cycle. Two or three steps of
-    /// Newton's method for a motion of some hundredths of a radian. If the guess is too far away to be sure of the assembly
-    /// mode, the pose is followed from the nominal one.
+    /// Passive coordinates of a pose, starting from those of a pose near by; in a controller, from those of the last
+    /// cycle. A motion of some hundredths of a radian takes two or three steps of Newton's method. If the guess is too
+    /// far away to guarantee the assembly mode, the pose is followed from the nominal one.
     ///
     /// # Errors
     /// As [`Self::passive_position`].
@@ -509,7 +511,7 @@ where
         };
         let given = INPUTS.saturating_sub(M::N_PASSIVE);
         let q = active(inputs);
-        // Followed from the state before, in a straight line; where that fails, from the nominal pose.
+        // Followed from the previous state in a straight line; if that fails, from the nominal pose.
         let near = last.and_then(|last| {
             let mut passive = model.nominal_passive().ok()?;
             for (to, from) in passive.as_mut().iter_mut().zip(last.iter().skip(given)) {
@@ -528,10 +530,10 @@ where
     }
 }
 
-/// What is wrong with base parameters.
+/// Checks base parameters.
 ///
 /// # Errors
-/// [`PoseError::NotFinite`] with the name of the first that is no number, or too large to compute with.
+/// [`PoseError::NotFinite`] with the name of the first that is NaN or too large to compute with.
 pub fn check_base<T: Real, const N: usize>(
     values: &[T; N],
     parameters: &[crate::BaseParameter; N],
@@ -539,17 +541,18 @@ pub fn check_base<T: Real, const N: usize>(
     check_finite(values, &parameters.map(|parameter| parameter.name))
 }
 
-/// What is wrong with the inputs of a model, as many states tell it.
+/// Converts an input error of a model into the error of an evaluation over many states.
 ///
 /// # Errors
-/// The same at the first state.
+/// The same error, reported at the first state.
 pub fn check_block_input(input: Result<(), PoseError>) -> Result<(), BlockError> {
     input.map_err(|reason| BlockError::At { sample: 0, reason })
 }
 
 /// The methods of an emitted `InverseDynamics` over many states.
 ///
-/// In scope are `States`, `inputs`, `N_DRIVES` and the program `Forces`; with `followed` passive coordinates are found first.
+/// In scope are `States`, `inputs`, `N_DRIVES` and the program `Forces`. With `followed`, passive coordinates are
+/// computed first.
 #[macro_export]
 macro_rules! forces_of_many {
     () => {
@@ -562,7 +565,8 @@ macro_rules! forces_of_many {
     };
     (@ |$model:ident| $program:expr, $inputs:tt) => {
         impl<T: $crate::blocks::BlockScalar> InverseDynamics<T> {
-            /// [`Self::forces`] at many states, in the widest vectors of the machine if the runtime has its feature `std`.
+            /// [`Self::forces`] at many states, in the widest vectors of the machine if the runtime has its feature
+            /// `std`.
             ///
             /// One array per drive, as long as those of the states.
             ///
@@ -596,12 +600,13 @@ macro_rules! forces_of_many {
                 $crate::blocks::fill_columns_in_parallel(&$program, &$inputs(states), outputs)
             }
 
-            /// [`Self::forces`] at many states, shown block by block; nothing is kept between blocks.
+            /// [`Self::forces`] at many states, passed on block by block; nothing is kept between blocks.
             ///
             /// Output `d` of a block belongs to drive `d`.
             ///
             /// # Errors
-            /// Arrays of different lengths; else the first state without an answer, after all before it have been shown.
+            /// Arrays of different lengths; else the first state without an answer, after all blocks before it have
+            /// been passed on.
             pub fn forces_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,
@@ -617,8 +622,8 @@ macro_rules! forces_of_many {
 
 /// The methods of an emitted `Model` over many states.
 ///
-/// In scope are `States`, `inputs`, `N_DRIVES`, `N_BASE` and the program `Regressor`; with `followed` passive coordinates are
-/// found first.
+/// In scope are `States`, `inputs`, `N_DRIVES`, `N_BASE` and the program `Regressor`. With `followed`, passive
+/// coordinates are computed first.
 #[macro_export]
 macro_rules! regressor_of_many {
     () => {
@@ -670,12 +675,13 @@ macro_rules! regressor_of_many {
                 $crate::blocks::fill_columns_in_parallel(&$program, &inputs, &mut columns)
             }
 
-            /// [`Self::regressor`] at many states, shown block by block; nothing is kept between blocks.
+            /// [`Self::regressor`] at many states, passed on block by block; nothing is kept between blocks.
             ///
             /// Output `d * N_BASE + b` of a block belongs to drive `d` and base parameter `b`.
             ///
             /// # Errors
-            /// Arrays of different lengths; else the first state without an answer, after all before it have been shown.
+            /// Arrays of different lengths; else the first state without an answer, after all blocks before it have
+            /// been passed on.
             pub fn regressor_in_blocks<'a>(
                 &self,
                 states: &States<'a, T>,

@@ -1,7 +1,7 @@
-//! What an emitted program computes with: one number, or as many as a vector of the machine holds.
+//! The arithmetic of an emitted program: one number at a time, or as many as a vector register of the machine takes.
 //!
-//! A program is written once, for [`Numbers`]. With [`One`] it is the function of one state; with the vectors of
-//! [`crate::blocks`] it runs over many states at once.
+//! A program is written once, for [`Numbers`]. With [`ScalarNumbers`] it is the function of one state; with the vectors
+//! of [`crate::blocks`] it runs over many states at once.
 //!
 //! Decision: an emitted program is generic over what computes, so that vectors cost no second copy to parse and
 //! check. They are instantiated where a user calls them; `modelmill-generated` compiles no vector code. The Panda's
@@ -13,16 +13,16 @@ use core::marker::PhantomData;
 use crate::arithmetic::{ProgramValue, Term, Var};
 use crate::{PoseError, Real};
 
-/// Arithmetic of a program: whatever needs more than what its variables know themselves.
+/// Arithmetic of a program: constants, sines and cosines, and the checks that may fail.
 pub trait Numbers {
     /// The numbers of the model: `f32` or `f64`.
     type Scalar: Real;
-    /// What a variable of the program holds.
+    /// Type of a variable: one number or a vector of them.
     type Value: ProgramValue;
 
     /// A value that is the same at every state.
     fn broadcast(&self, x: Self::Scalar) -> Var<Self::Value>;
-    /// A number that stands in the program.
+    /// A literal number of the program.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
     fn number(&self, x: f64) -> Var<Self::Value> {
@@ -30,9 +30,9 @@ pub trait Numbers {
     }
     /// Sine and cosine of an angle in rad.
     fn sin_cos(&self, angle: impl Term<Self::Value>) -> (Var<Self::Value>, Var<Self::Value>);
-    /// Angles in rad whose sines and cosines [`Self::sin_cos_of`] gives later. One number computes all of them here, which
-    /// takes less time than one by one; vectors wait, since they lack the registers to hold the results, and look only
-    /// whether one is too large.
+    /// Prepares angles in rad, whose sines and cosines [`Self::sin_cos_of`] returns later. For one number all of them
+    /// are computed here, which takes less time than one by one. Vectors have too few registers for the results, so
+    /// they compute later and only check here whether an angle is too large.
     #[allow(clippy::inline_always, reason = "nothing at all")]
     #[inline(always)]
     fn angles<const N: usize>(&self, angles: [Var<Self::Value>; N]) -> AngleBatch<Self::Value, N> {
@@ -52,28 +52,29 @@ pub trait Numbers {
         self.sin_cos(angles.sines[k])
     }
 
-    /// Asks that a value is not negative.
+    /// Checks that a value is not negative.
     ///
     /// # Errors
-    /// [`PoseError::OutOfReach`] for one number; a block remembers it and is looked at one by one.
+    /// [`PoseError::OutOfReach`] for one number. A block records the failure and evaluates its states one by one.
     fn reachable(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
-    /// Asks that a determinant does not vanish beside the magnitude of its terms; see [`Real::singular`].
+    /// Checks that a determinant is not zero relative to the magnitude of its terms; see [`Real::singular`].
     ///
     /// # Errors
-    /// [`PoseError::Singular`] for one number; a block remembers it and is looked at one by one.
+    /// [`PoseError::Singular`] for one number. A block records the failure and evaluates its states one by one.
     fn regular(
         &self,
         x: impl Term<Self::Value>,
         size: impl Term<Self::Value>,
     ) -> Result<(), PoseError>;
-    /// Asks that a value is a finite number.
+    /// Checks that a value is a finite number.
     ///
     /// # Errors
-    /// [`PoseError::Undefined`] for one number; a block remembers it and is looked at one by one.
+    /// [`PoseError::Undefined`] for one number. A block records the failure and evaluates its states one by one.
     fn finite(&self, x: impl Term<Self::Value>) -> Result<(), PoseError>;
 }
 
-/// Angles whose sines and cosines are asked for later: both, or the angles themselves where these are not computed yet.
+/// Angles whose sines and cosines are needed later: the sines and cosines, or the angles where those are not computed
+/// yet.
 #[derive(Clone, Copy, Debug)]
 pub struct AngleBatch<V, const N: usize> {
     pub(crate) sines: [Var<V>; N],
@@ -121,7 +122,7 @@ impl<T: Real> Numbers for ScalarNumbers<T> {
     fn sin_cos_of<const N: usize>(&self, angles: &AngleBatch<T, N>, k: usize) -> (Var<T>, Var<T>) {
         (angles.sines[k], angles.cosines[k])
     }
-    // Each is written so that what is no number fails as well.
+    // The comparisons are written so that NaN fails as well.
     #[inline(always)]
     fn reachable(&self, x: impl Term<T>) -> Result<(), PoseError> {
         if x.get() >= T::from_f64(0.0) {
@@ -148,7 +149,7 @@ impl<T: Real> Numbers for ScalarNumbers<T> {
     }
 }
 
-/// Where a program leaves its results.
+/// Destination of the results of a program.
 pub trait OutputSink<V> {
     /// Takes output `k`.
     fn put(&mut self, k: usize, value: impl Term<V>);
@@ -193,8 +194,8 @@ impl<T: Real, const ROWS: usize, const COLUMNS: usize> ZeroedOutputs<T> for [[T;
 mod tests {
     use super::*;
 
-    /// A determinant of terms of size 100 counts as zero below 1e-7 where numbers have 16 digits, and where they have 7,
-    /// below ten times what rounding leaves.
+    /// A determinant of terms of size 100 counts as zero below 1e-7 where numbers have 16 digits, and where they have
+    /// 7, below ten times what rounding leaves.
     #[test]
     fn singular_poses_are_told_by_the_digits_that_there_are() {
         let double = |x| ScalarNumbers::<f64>::new().regular(Var(x), Var(100.0));

@@ -2,15 +2,16 @@
 
 use crate::{PoseError, Real};
 
-/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting; `rhs` becomes `x`, the matrix is used up.
+/// Solves `matrix * x = rhs` by Gaussian elimination with partial pivoting; `rhs` becomes `x`, the matrix is
+/// overwritten.
 ///
 /// # Errors
-/// [`PoseError::Singular`] if a pivot is zero or no number.
+/// [`PoseError::Singular`] if a pivot is zero or NaN.
 pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
     matrix: &mut [Row],
     rhs: &mut [T],
 ) -> Result<(), PoseError> {
-    // Nothing is indexed, so that nothing can panic: what is not there is read as zero, and a pivot of zero is an error.
+    // Nothing is indexed, so that nothing can panic: a missing entry is read as zero, and a pivot of zero is an error.
     let zero = T::from_f64(0.0);
     let entry = |row: &Row, column: usize| row.as_ref().get(column).copied().unwrap_or(zero);
     let n = rhs.len();
@@ -18,7 +19,7 @@ pub fn solve<T: Real, Row: AsRef<[T]> + AsMut<[T]>>(
         let mut pivot = (column, zero);
         for (row, values) in matrix.iter().enumerate().take(n).skip(column) {
             let size = entry(values, column).abs();
-            // What is no number fails this comparison.
+            // NaN fails this comparison.
             if size > pivot.1 {
                 pivot = (row, size);
             }

@@ -1,8 +1,8 @@
-//! Programs in the widest vectors of the machine, by way of `pulp`, which asks the machine at run time and keeps the
-//! instructions behind a safe face: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
+//! Programs in the widest vectors of the machine. The crate `pulp` detects the machine at run time and wraps its
+//! instructions in a safe interface: 512 bits with AVX-512, 256 with AVX2, 128 with NEON, else one number at a time.
 //!
-//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results agree
-//! with those of one state, and between machines, to rounding.
+//! Products are fused with the sums that they go into where the machine has an instruction for that, so that results
+//! agree with those of one state, and between machines, to rounding.
 //!
 //! Decision: `pulp` and not arrays. The compiler leaves a loop over an array of eight in memory; values of `pulp`
 //! are registers from the start. Products are fused in vectors only: that saves a third of the instructions where
@@ -27,9 +27,10 @@ use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
 use crate::numbers::AngleBatch;
 use crate::{Numbers, OutputSink, PoseError, Real};
 
-/// The widest vectors of the machine, or narrower ones if the environment variable `MODELMILL_VECTORS` asks for `256` bits
-/// or `none`, so that the figures of another machine can be seen on this one.
+/// The widest vectors of the machine. The environment variable `MODELMILL_VECTORS` reduces them to `256` bits or
+/// `none`, so that the timings of a smaller machine can be measured on this one.
 fn widest_vectors() -> Arch {
+    /// Selected at the first call.
     static CHOSEN: OnceLock<Arch> = OnceLock::new();
     *CHOSEN.get_or_init(|| match std::env::var("MODELMILL_VECTORS").as_deref() {
         Ok("none") => Arch::Scalar,
@@ -39,9 +40,11 @@ fn widest_vectors() -> Arch {
     })
 }
 
-/// A job inside the vectors that `pulp` chose.
+/// Passes a job on to the vectors that `pulp` selected.
 struct DispatchedJob<J, T>(J, core::marker::PhantomData<T>);
 
+// Defines vectors, their arithmetic and the run over a line for one scalar type. Arguments: the scalar, the line, names
+// of the types to define, then the names that `pulp` gives to types and instructions for this scalar.
 macro_rules! wide {
     (
         $float:ty, $line:ident, $value:ident, $numbers:ident, $put:ident, $vectors:ident,
@@ -49,13 +52,16 @@ macro_rules! wide {
         $fused:ident, $fused_less:ident, $sqrt:ident, $abs:ident, $less:ident, $greater:ident, $at_least:ident, $and:ident, $not:ident, $first:ident,
         $select:ident, $max:ident, $of_slice:ident, $of_slice_mut:ident
     ) => {
-        /// As many numbers as a vector holds.
+        /// One vector register of numbers.
         #[derive(Clone, Copy)]
         struct $value<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// The register.
             v: S::$floats,
         }
 
+        // Plain operators; products that are fused with sums are below.
         wide!(operator $value, Add, add, $add);
         wide!(operator $value, Sub, sub, $sub);
         wide!(operator $value, Mul, mul, $mul);
@@ -74,11 +80,14 @@ macro_rules! wide {
 
         /// Arithmetic of a vector, and which of its lanes are regular.
         struct $numbers<S: Simd> {
+            /// Token that proves that the instructions exist.
             simd: S,
+            /// Mask with true for each lane without an exception so far.
             regular: Cell<S::$mask>,
         }
 
         impl<S: Simd> $numbers<S> {
+            /// All lanes are regular at first: `pulp` has no constant mask, so 0 < 1 makes one.
             #[inline(always)]
             fn new(simd: S) -> Self {
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
@@ -88,16 +97,19 @@ macro_rules! wide {
                 }
             }
 
+            /// A vector as a value of the program.
             #[inline(always)]
             fn value(&self, v: S::$floats) -> $value<S> {
                 $value { simd: self.simd, v }
             }
 
+            /// Marks lanes as irregular where the mask is false.
             #[inline(always)]
             fn mask_lanes(&self, mask: S::$mask) {
                 self.regular.set(self.simd.$and(self.regular.get(), mask));
             }
 
+            /// Whether no lane is irregular.
             #[inline(always)]
             fn is_all_regular(&self) -> bool {
                 let irregular = self.simd.$not(self.regular.get());
@@ -106,6 +118,7 @@ macro_rules! wide {
         }
 
         impl<S: Simd> $value<S> {
+            /// Another vector with the same token.
             #[inline(always)]
             fn with_vector(self, v: S::$floats) -> Self {
                 Self { simd: self.simd, v }
@@ -114,6 +127,7 @@ macro_rules! wide {
             /// A function that has no vector form, lane by lane.
             #[inline(always)]
             fn map_lanes(self, f: impl Fn($float) -> $float) -> Self {
+                // Lanes go through an array; lanes that the vector does not have stay zero.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = self.v;
@@ -155,6 +169,7 @@ macro_rules! wide {
             fn sign(self) -> Self {
                 let simd = self.simd;
                 let (zero, one) = (simd.$splat(0.0), simd.$splat(1.0));
+                // The first selection returns NaN and 0 unchanged.
                 let below = simd.$select(simd.$less(self.v, zero), simd.$splat(-1.0), self.v);
                 self.with_vector(simd.$select(simd.$greater(self.v, zero), one, below))
             }
@@ -168,6 +183,7 @@ macro_rules! wide {
             }
             #[inline(always)]
             fn atan2(self, x: Self) -> Self {
+                // The other argument is read from an array, lane after lane.
                 let mut line = [0.0; $line::LENGTH];
                 if let Some(to) = S::$of_slice_mut(&mut line).0.first_mut() {
                     *to = x.v;
@@ -192,6 +208,7 @@ macro_rules! wide {
             fn sin_cos(&self, angle: impl Term<$value<S>>) -> (Var<$value<S>>, Var<$value<S>>) {
                 let angle = angle.get();
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
+                // Larger angles need another reduction than the kernel has, so their states are evaluated one by one.
                 self.mask_lanes(simd.$less(simd.$abs(angle.v), simd.$splat(largest)));
                 let (sin, cos) = angle.sin_cos();
                 (Var(sin), Var(cos))
@@ -199,7 +216,7 @@ macro_rules! wide {
             #[inline(always)]
             fn angles<const N: usize>(&self, angles: [Var<$value<S>>; N]) -> AngleBatch<$value<S>, N> {
                 let (simd, largest) = (self.simd, <$float as Real>::from_f64(LARGEST_ANGLE));
-                // What is no number may be lost in the larger of two; inputs are looked at before.
+                // The maximum of two may drop NaN; inputs are therefore checked before.
                 let mut size = simd.$splat(0.0);
                 for angle in angles {
                     size = simd.$max(size, simd.$abs(angle.0.v));
@@ -238,8 +255,11 @@ macro_rules! wide {
 
         /// Writes one vector of each line.
         struct $put<'a, S, const OUTPUTS: usize> {
+            /// Lines of all outputs.
             lines: &'a mut [$line; OUTPUTS],
+            /// Index of the vector in a line.
             part: usize,
+            /// Token that proves that the instructions exist.
             simd: S,
         }
 
@@ -253,6 +273,7 @@ macro_rules! wide {
             }
         }
 
+        /// Vectors of the width of the token `S`.
         #[derive(Clone, Copy)]
         struct $vectors<S>(S);
 
@@ -270,6 +291,7 @@ macro_rules! wide {
             {
                 let simd = self.0;
                 let mut regular = true;
+                // A line consists of one or several vectors, each of which runs the program once.
                 for part in 0..$line::LENGTH / S::$lanes {
                     let numbers = $numbers::new(simd);
                     let zero = simd.$splat(0.0);
@@ -285,6 +307,7 @@ macro_rules! wide {
                             sum = simd.$add(sum, simd.$abs(*v));
                         }
                     }
+                    // Inputs that are NaN or too large make their lanes irregular.
                     numbers.mask_lanes(simd.$less(sum, simd.$splat(<$float as Real>::largest())));
                     let lines = &mut *outputs;
                     let mut put = $put { lines, part, simd };
@@ -388,12 +411,13 @@ wide!(
 );
 
 impl<S: Simd> Wide64<S> {
+    /// Sine and cosine of angles in rad below [`LARGEST_ANGLE`].
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         reduced_sin_cos(self)
     }
 
-    /// The other one where the mask is set.
+    /// The other value where the mask is set.
     #[inline(always)]
     fn select_lanes(self, mask: S::m64s, other: Self) -> Self {
         Self {
@@ -402,7 +426,7 @@ impl<S: Simd> Wide64<S> {
         }
     }
 
-    /// Turned around in the third and fourth quarter.
+    /// Sign changed in the third and fourth quadrant.
     #[inline(always)]
     fn with_sign(self, quarter: S::u64s) -> Self {
         let (simd, two) = (self.simd, self.simd.splat_u64s(2));
@@ -418,6 +442,7 @@ impl<S: Simd> Wide64<S> {
 impl<S: Simd> lanes::LaneAngle for Wide64<S> {
     #[inline(always)]
     fn rotate_by_quarters(shifted: Self, sin: Self, cos: Self) -> (Self, Self) {
+        // In odd quarters sine and cosine change places; the signs depend on the quarter, one later for the cosine.
         let simd = shifted.simd;
         let one = simd.splat_u64s(1);
         let quarter = simd.transmute_u64s_f64s(shifted.v);
@@ -441,6 +466,7 @@ impl<S: Simd> Wide32<S> {
         if let Some(to) = S::as_mut_simd_f32s(&mut line).0.first_mut() {
             *to = self.v;
         }
+        // One loop per step, so that each can be vectorised.
         for k in 0..S::F32_LANES.min(Line32::LENGTH) {
             angle[k] = f64::from(line[k]);
         }

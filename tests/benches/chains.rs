@@ -48,7 +48,7 @@ fn main() {
             .unwrap_or_else(|failure| panic!("{}", failure.render(false)));
         let derivation = modelmill_codegen::derive(&loaded.mechanism)
             .unwrap_or_else(|error| panic!("{name}: {error}"));
-        let module = modelmill_codegen::emit(&derivation).module();
+        let module = modelmill_emit::emit(&derivation).module();
         let seconds = processor_seconds() - start;
         println!(
             "{name:<10} {JOINTS:>7} {:>6} {seconds:>14.2} {:>10.0}",

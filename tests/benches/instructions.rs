@@ -128,7 +128,7 @@ fn measured_by_name(name: &str, function: &str, calls: usize) {
             let mechanism = model(name);
             repeat_calls(calls, &mut |_| {
                 let derivation = derive(black_box(&mechanism));
-                black_box(modelmill_codegen::emit(&derivation).module());
+                black_box(modelmill_emit::emit(&derivation).module());
             });
         }
         "H_min, block" | "inverse dynamics, block" => {

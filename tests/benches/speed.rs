@@ -93,7 +93,7 @@ mod generation {
     #[divan::bench(args = MODELS, sample_count = 10)]
     fn from_file_to_source(name: &str) -> usize {
         let derivation = derive(&model(name));
-        black_box(modelmill_codegen::emit(&derivation).module()).len()
+        black_box(modelmill_emit::emit(&derivation).module()).len()
     }
 }
 

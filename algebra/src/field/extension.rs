@@ -1,11 +1,11 @@
-//! The quadratic extension of a prime field: pairs `re + im i` with `i^2 = -1`, which is no square in the fields that
-//! are used.
+//! The quadratic extension of a prime field: pairs `re + im i` with `i^2 = -1`, where -1 is no square in the prime
+//! fields used here.
 //!
-//! Every element of the prime field has a root here. A loop that takes its roots of a pose drawn in the prime field
-//! therefore closes at every draw, however many roots there are: six legs with two each would otherwise need four
+//! Every element of the prime field has a square root here. So the loops of a pose that is drawn in the prime field
+//! close at every draw, however many roots there are. Six legs with two roots each would otherwise need four
 //! thousand draws for one pose.
 //!
-//! Decision: each equation counts twice here. The factors lie in the prime field, so real and imaginary parts obey
+//! Decision: each equation counts twice here. The factors lie in the prime field, so real and imaginary parts satisfy
 //! the same relations.
 
 use std::ops::{Add, Mul, Neg, Sub};
@@ -13,7 +13,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 use super::{FieldElement, FieldNumber, MODULUS, RandomStream};
 use crate::Rational;
 
-/// `re + im i`
+/// The number `re + im i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct ExtensionElement<const P: u64 = MODULUS> {
     /// The part in the prime field.
@@ -30,7 +30,7 @@ impl<const P: u64> From<FieldElement<P>> for ExtensionElement<P> {
 }
 
 impl<const P: u64> ExtensionElement<P> {
-    /// `re^2 + im^2`, which is zero for zero alone.
+    /// `re^2 + im^2`, which is zero only for zero.
     fn norm(self) -> FieldElement<P> {
         self.re * self.re + self.im * self.im
     }
@@ -38,6 +38,7 @@ impl<const P: u64> ExtensionElement<P> {
 
 impl<const P: u64> Add for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -48,6 +49,7 @@ impl<const P: u64> Add for ExtensionElement<P> {
 
 impl<const P: u64> Sub for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -55,6 +57,7 @@ impl<const P: u64> Sub for ExtensionElement<P> {
 
 impl<const P: u64> Neg for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn neg(self) -> Self {
         Self {
             re: -self.re,
@@ -65,25 +68,11 @@ impl<const P: u64> Neg for ExtensionElement<P> {
 
 impl<const P: u64> Mul for ExtensionElement<P> {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
-        // Most values stay in the prime field.
-        match (
-            self.im == FieldElement::ZERO,
-            other.im == FieldElement::ZERO,
-        ) {
-            (true, true) => (self.re * other.re).into(),
-            (true, false) => Self {
-                re: self.re * other.re,
-                im: self.re * other.im,
-            },
-            (false, true) => Self {
-                re: self.re * other.re,
-                im: self.im * other.re,
-            },
-            (false, false) => Self {
-                re: self.re * other.re - self.im * other.im,
-                im: self.re * other.im + self.im * other.re,
-            },
+        Self {
+            re: FieldElement::sum_of_products([self.re, other.re], [-self.im, other.im]),
+            im: FieldElement::sum_of_products([self.re, other.im], [self.im, other.re]),
         }
     }
 }
@@ -103,6 +92,7 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
     }
 
     fn inverse(self) -> Option<Self> {
+        // 1/(re + im i) = (re - im i)/norm
         let norm = self.norm().inverse()?;
         Some(Self {
             re: self.re * norm,
@@ -111,6 +101,7 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
     }
 
     fn square_root(self) -> Option<Self> {
+        // An element of the prime field, or its negative, is a square there.
         if self.im == FieldElement::ZERO {
             let re = self.re;
             return re.square_root().map(Self::from).or_else(|| {
@@ -119,7 +110,8 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
                 Some(Self { re, im })
             });
         }
-        // (u + v i)^2 = re + im i gives u^2 = (re + s)/2 with s^2 the norm; of the two signs of s one makes a square.
+        // (u + v i)^2 = re + im i gives u^2 = (re + s)/2, where s^2 is the norm. For one of the two signs of s this is
+        // a square. The norm must have a root in the prime field.
         let root = self.norm().square_root()?;
         let half = FieldElement::from_i64(2).inverse()?;
         let u = ((self.re + root) * half)
@@ -130,9 +122,11 @@ impl<const P: u64> FieldNumber for ExtensionElement<P> {
     }
 
     fn hash_with_seed(self, seed: u64) -> Self {
+        // Elements of the prime field must have the same value as there.
         if self.im == FieldElement::ZERO {
             return self.re.hash_with_seed(seed).into();
         }
+        // Both parts depend on both parts of the number.
         let part = self.im.hash_with_seed(seed).representative();
         Self {
             re: self.re.hash_with_seed(seed ^ part),

@@ -1,4 +1,4 @@
-//! What the prime field and its quadratic extension have in common: points of motion are drawn over either.
+//! Operations that the prime field and its quadratic extension have in common: points of motion are drawn over either.
 
 use std::ops::{Add, Mul, Neg, Sub};
 
@@ -27,14 +27,14 @@ pub trait FieldNumber:
     /// Multiplicative inverse; `None` for 0.
     fn inverse(self) -> Option<Self>;
 
-    /// A square root if there is one.
+    /// A square root, if there is one.
     fn square_root(self) -> Option<Self>;
 
-    /// A value that depends on `self` and `seed` alone and otherwise looks random; of the prime field for its elements.
+    /// A pseudorandom number that depends on `self` and `seed` alone; in the prime field for its elements.
     #[must_use]
     fn hash_with_seed(self, seed: u64) -> Self;
 
-    /// 64 bits that depend on `self` and `seed` alone and otherwise look random.
+    /// 64 pseudorandom bits that depend on `self` and `seed` alone.
     fn hash_bits(self, seed: u64) -> u64;
 
     /// A random number of the prime field.
@@ -45,6 +45,7 @@ pub trait FieldNumber:
 
     /// Integer power; `None` for a negative power of 0.
     fn integer_power(self, exponent: i32) -> Option<Self> {
+        // Repeated squaring of the number or of its inverse.
         let mut base = if exponent < 0 { self.inverse()? } else { self };
         let mut left = exponent.unsigned_abs();
         let mut result = Self::ONE;

@@ -1,10 +1,10 @@
-//! Files on a disk, and what else a path may lead to.
+//! Files on a disk, and other things that a path may lead to.
 //!
-//! - An ordinary file is read up to the cap.
-//! - Standard input and pipes that were handed over by a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the
-//!   cap; whoever writes is waited for, since the shell started it together with us.
-//! - A named pipe is waited for as long as [`Disk::patience`] says, at its opening and between its bytes: there may be
-//!   nobody at its other end.
+//! - An ordinary file is read up to the limit.
+//! - Standard input and pipes of a shell (`/dev/stdin`, `<(zcat run.csv.gz)`) are read up to the limit. There is no
+//!   timeout, because the shell has started the writer together with this program.
+//! - A named pipe has the timeout [`DiskFiles::pipe_timeout`] for its opening and between its bytes, because it may
+//!   have no writer.
 //! - Devices and sockets are refused, unless one is standard input.
 
 use std::fs::{File, Metadata};
@@ -16,22 +16,22 @@ use std::time::Duration;
 
 use super::{FileError, FileFault, FileSource, OpenFile, PathKind, write};
 
-/// The files of this machine; clones remember together what was read.
+/// The files of this machine. Clones share the list of files that were read.
 #[derive(Clone, Debug)]
 pub struct DiskFiles {
-    /// How long a named pipe is waited for.
+    /// Longest time without bytes from a named pipe.
     pub pipe_timeout: Duration,
-    /// What was read, so that it is never overwritten.
+    /// Files that were read, which are therefore never overwritten.
     read: Arc<Mutex<Vec<FileIdentity>>>,
 }
 
-/// What makes two paths one file, be it through links.
+/// The identity of a file, independent of links.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum FileIdentity {
-    /// Device and number on it: a hard link is the same file under a path of its own.
+    /// Number of the device and of the file on it; hard links have the same numbers.
     #[cfg(unix)]
     Number(u64, u64),
-    /// The path without links.
+    /// The path after all links are resolved.
     #[cfg(not(unix))]
     Path(PathBuf),
 }
@@ -46,12 +46,12 @@ impl Default for DiskFiles {
 }
 
 impl DiskFiles {
-    /// Whether a path leads to a file that was read here, however both are reached.
+    /// Whether a path leads to a file that was read here, also through links.
     pub fn has_read(&self, path: &Path) -> bool {
         identity(path).is_some_and(|found| self.lock_read_identities().contains(&found))
     }
 
-    /// Writes a file as a whole (see [`write()`]); fails when it is one that was read here.
+    /// Writes a file atomically (see [`write()`]). Fails when it is a file that was read here.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         if self.has_read(path) {
             return Err(FileError::new(path, FileFault::Input));
@@ -59,21 +59,23 @@ impl DiskFiles {
         write(path, bytes)
     }
 
-    /// Writes a file as a whole over one that was read, as an edit in place does.
+    /// Writes a file atomically over one that was read, for edits in place.
     pub fn replace(&self, path: &Path, bytes: &[u8]) -> Result<(), FileError> {
         let old = identity(path);
         write(path, bytes)?;
-        // The old file is no more; its number may be given to another one.
+        // The old file is gone, and its number may be used for another one.
         let mut known = self.lock_read_identities();
         known.retain(|one| Some(one) != old.as_ref());
         known.extend(identity(path));
         Ok(())
     }
 
+    /// The files that were read; a lock of a thread that panicked is still valid.
     fn lock_read_identities(&self) -> std::sync::MutexGuard<'_, Vec<FileIdentity>> {
         self.read.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Adds a file to those that were read.
     fn record_read(&self, path: &Path) {
         if let Some(found) = identity(path) {
             let mut known = self.lock_read_identities();
@@ -100,6 +102,7 @@ impl FileSource for DiskFiles {
     }
 
     fn list(&self, folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+        // Entries are sorted, because the order of a disk is arbitrary.
         let fail = |error: io::Error| FileError::from_io_error(folder, &error);
         let entries = std::fs::read_dir(folder).map_err(fail)?;
         let mut found = entries
@@ -110,6 +113,7 @@ impl FileSource for DiskFiles {
         Ok(found)
     }
 
+    // What the path leads to decides how it is opened.
     fn open(&self, path: &Path, most: u64) -> Result<OpenFile, FileError> {
         let fail = |error: io::Error| FileError::from_io_error(path, &error);
         let found = path.metadata().map_err(fail)?;
@@ -130,12 +134,13 @@ impl FileSource for DiskFiles {
                 return Err(FileError::new(path, FileFault::Device));
             }
         };
+        // Only files that could be opened are protected from being overwritten.
         self.record_read(path);
         Ok(opened)
     }
 }
 
-/// What a path leads to that is there.
+/// What an existing path leads to.
 fn kind_of(found: &Metadata, path: &Path) -> PathKind {
     if found.is_file() {
         return PathKind::File;
@@ -147,6 +152,7 @@ fn kind_of(found: &Metadata, path: &Path) -> PathKind {
     if std::os::unix::fs::FileTypeExt::is_fifo(&found.file_type()) {
         return PathKind::Stream;
     }
+    // Anything else that the shell has opened is read as a stream, too.
     if is_handed_over(path) {
         PathKind::Stream
     } else {
@@ -154,22 +160,23 @@ fn kind_of(found: &Metadata, path: &Path) -> PathKind {
     }
 }
 
-/// Whether a path names standard input.
+/// Whether a path is a name of standard input.
 fn is_standard_input(path: &Path) -> bool {
     ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"]
         .iter()
         .any(|name| path == Path::new(name))
 }
 
-/// Whether a path names what a shell has opened for us.
+/// Whether a path is a descriptor that the shell has opened.
 fn is_handed_over(path: &Path) -> bool {
     path == Path::new("/dev/stdin")
         || path.starts_with("/dev/fd")
         || path.starts_with("/proc/self/fd")
 }
 
-/// All bytes of a stream, unless there are more than `most`.
+/// All bytes of a stream; fails when there are more than `most`.
 fn read_capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, FileError> {
+    // One byte more than allowed shows that the stream is too long.
     let mut bytes = Vec::new();
     stream
         .take(most.saturating_add(1))
@@ -178,17 +185,20 @@ fn read_capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, Fil
     if bytes.len() as u64 > most {
         return Err(FileError::new(path, FileFault::TooLarge { most }));
     }
-    // What was read by doubling may take up twice its room.
+    // A vector that grew by doubling may use up to twice the memory.
     bytes.shrink_to_fit();
     Ok(bytes)
 }
 
-/// All bytes of a named pipe. A thread waits for them; if none come, it is left waiting.
+/// All bytes of a named pipe. A thread reads them; without a writer that thread waits forever.
+///
+/// Fails after `patience` without bytes, or when there are more than `most`.
 fn read_pipe_with_timeout(
     path: &Path,
     most: u64,
     patience: Duration,
 ) -> Result<Vec<u8>, FileError> {
+    // The channel is short, so that the thread cannot read far ahead.
     let (sender, receiver) = sync_channel(4);
     let pipe = path.to_owned();
     std::thread::Builder::new()
@@ -215,7 +225,7 @@ fn read_pipe_with_timeout(
     }
 }
 
-/// Sends what comes through a pipe until it ends or nobody takes it any more.
+/// Sends the bytes of a pipe until it ends or the receiver is gone.
 fn forward_pipe(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
     let mut stream = match File::open(pipe) {
         Ok(stream) => stream,
@@ -235,11 +245,12 @@ fn forward_pipe(pipe: &Path, to: &SyncSender<io::Result<Vec<u8>>>) {
     }
 }
 
+/// The identity of an ordinary file; `None` for anything else.
 #[cfg(unix)]
 fn identity(path: &Path) -> Option<FileIdentity> {
     use std::os::unix::fs::MetadataExt;
     let found = path.metadata().ok()?;
-    // Terminals and the like may be read and written at once.
+    // Terminals and similar devices may be read and written at the same time.
     found
         .is_file()
         .then(|| FileIdentity::Number(found.dev(), found.ino()))

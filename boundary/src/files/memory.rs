@@ -1,4 +1,4 @@
-//! Files in memory, as a browser or a test has them.
+//! Files in memory, for browsers and tests.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -6,34 +6,36 @@ use std::sync::Arc;
 
 use super::{FileError, FileFault, FileSource, OpenFile, PathKind, normalise_path};
 
-/// Files in memory by their paths; folders are there as far as files are in them.
+/// Files in memory by their paths. Folders exist as far as there are files in them.
 ///
 /// ```
-/// use modelmill_boundary::files::{Files, Memory};
-/// let files = Memory::default().with("models/arm.toml", "schema = 1");
+/// use modelmill_boundary::files::{FileSource, MemoryFiles};
+/// let files = MemoryFiles::default().with_file("models/arm.toml", "schema = 1");
 /// assert_eq!(files.read_text("models/./arm.toml".as_ref(), 100)?, "schema = 1");
 /// assert!(files.read("models/leg.toml".as_ref(), 100).is_err());
 /// # Ok::<(), modelmill_boundary::files::FileError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct MemoryFiles {
+    /// Contents by normalised path.
     files: BTreeMap<PathBuf, Arc<Vec<u8>>>,
 }
 
 impl MemoryFiles {
-    /// These files and one more, which takes the place of one of its path.
+    /// These files and one more, which replaces a file of the same path.
     #[must_use]
     pub fn with_file(mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) -> Self {
         self.insert(path, bytes);
         self
     }
 
-    /// Adds a file, which takes the place of one of its path.
+    /// Adds a file, which replaces a file of the same path.
     pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) {
         self.files
             .insert(normalise_path(path.as_ref()), Arc::new(bytes.into()));
     }
 
+    /// The contents of a file of at most `most` bytes.
     fn find(&self, path: &Path, most: u64) -> Result<&Arc<Vec<u8>>, FileError> {
         let fail = |fault| Err(FileError::new(path, fault));
         match self.files.get(&normalise_path(path)) {
@@ -69,7 +71,7 @@ impl FileSource for MemoryFiles {
             .filter_map(|path| path.strip_prefix(&folder).ok()?.components().next())
             .map(|first| folder.join(first))
             .collect();
-        // The keys are sorted, so what is in one subfolder stands together.
+        // The keys are sorted, so entries of the same subfolder follow each other.
         found.dedup();
         if found.is_empty() {
             return Err(FileError::new(&folder, FileFault::Missing));
@@ -78,7 +80,7 @@ impl FileSource for MemoryFiles {
     }
 
     fn open(&self, path: &Path, _: u64) -> Result<OpenFile, FileError> {
-        // What is in memory already needs no cap.
+        // The contents are in memory already, so there is no limit.
         self.find(path, u64::MAX).cloned().map(OpenFile::Memory)
     }
 }

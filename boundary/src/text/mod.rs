@@ -1,8 +1,8 @@
-//! Free text of users (titles, notes, headers of recordings, names of files) on its way out.
+//! Free text of users (titles, notes, headers of recordings, names of files) for output.
 //!
-//! What comes from a file may hold anything: sequences that move a terminal's cursor, marks that turn the direction of
-//! writing, the end of a comment. Each output has one function that leaves ordinary text as it is and makes the rest
-//! harmless. [`Message`] is text of the program's own, with typed remedies in it.
+//! Text from a file may contain anything: control sequences of terminals, marks that change the direction of writing,
+//! the end of a comment. Each kind of output has one function that keeps ordinary text and makes the rest harmless.
+//! [`Message`] is text of the program with typed remedies.
 
 mod escape;
 mod message;
@@ -16,8 +16,8 @@ pub use message::Message;
 pub use message::{MessageArgument, MessageSink, MessageSlot};
 pub use remedy::{CommandName, LibrarySpelling, OptionName, OptionSetting, Remedy, RemedySpelling};
 
-/// Text on one line: line ends and tabs become blanks, and what steers a terminal or the direction of writing becomes
-/// the replacement character.
+/// Text on one line. Line ends and tabs become blanks. Control characters of terminals and of the direction of
+/// writing become the replacement character.
 ///
 /// ```
 /// use modelmill_boundary::text::plain;
@@ -28,18 +28,19 @@ pub fn plain(text: &str) -> Cow<'_, str> {
     filter_characters(text, &[])
 }
 
-/// As [`plain`], but lines stay lines and tabs stay tabs; line ends of other systems become line feeds.
+/// Like [`plain`], but line ends and tabs are kept; line ends of other systems become line feeds.
 pub fn lines(text: &str) -> Cow<'_, str> {
     filter_characters(text, &['\n', '\t'])
 }
 
-/// Text for a terminal or standard output: as [`lines`], and where it is `coloured`, what marks text as bold, dim or
-/// coloured stays.
+/// Text for a terminal or standard output. It is treated as by [`lines`], but if `coloured`, marks for bold, dim or
+/// coloured text are kept.
 pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
     if !coloured || !text.contains('\u{1b}') {
         return lines(text);
     }
     let mut out = String::with_capacity(text.len());
+    // Escape characters that do not start an allowed mark are replaced.
     let mut rest = text;
     while let Some(at) = rest.find('\u{1b}') {
         out.push_str(&lines(&rest[..at]));
@@ -54,17 +55,19 @@ pub fn terminal(text: &str, coloured: bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Length of the mark of bold, dim or coloured text that a text begins with: `ESC [ numbers m`, none of them hiding text.
+/// Length of the mark for bold, dim or coloured text at the start of a text: `ESC [ numbers m`. Marks that hide text
+/// do not count.
 fn colour_mark_length(text: &str) -> Option<usize> {
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
+    // Allowed are styles that show the text, and the usual colours.
     let is_shown = numbers[..end].split(';').all(|n| {
         matches!(n.parse::<u8>(), Ok(0..=4 | 22..=24 | 30..=39 | 90..=97)) || n.is_empty()
     });
     (numbers[end..].starts_with('m') && is_shown).then_some(2 + end + 1)
 }
 
-/// The text without what does harm, but for the characters to be kept.
+/// Replaces harmful characters, except for those in `kept`.
 fn filter_characters<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     if text.chars().all(|c| kept.contains(&c) || !is_harmful(c)) {
         return Cow::Borrowed(text);
@@ -74,6 +77,7 @@ fn filter_characters<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     while let Some(c) = chars.next() {
         out.push(match c {
             c if kept.contains(&c) || !is_harmful(c) => c,
+            // The carriage return of a pair is dropped, and the line feed becomes a blank.
             '\r' if chars.peek() == Some(&'\n') => continue,
             '\r' | '\n' | '\t' | '\u{b}' | '\u{c}' | '\u{85}' | '\u{2028}' | '\u{2029}' => ' ',
             _ => char::REPLACEMENT_CHARACTER,
@@ -82,12 +86,12 @@ fn filter_characters<'a>(text: &'a str, kept: &[char]) -> Cow<'a, str> {
     Cow::Owned(out)
 }
 
-/// Whether a character moves a cursor, begins a line, turns the direction of writing, or speaks to programs only.
+/// Whether a character moves a cursor, ends a line, changes the direction of writing, or is invisible.
 fn is_harmful(c: char) -> bool {
     c.is_control() || is_direction_control(c) || matches!(c, '\u{2028}' | '\u{2029}')
 }
 
-/// Whether a character turns the direction of writing, or is not to be seen and says something to programs only.
+/// Whether a character changes the direction of writing, or is invisible and has a meaning for programs only.
 fn is_direction_control(c: char) -> bool {
     matches!(
         c,

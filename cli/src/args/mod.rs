@@ -5,11 +5,14 @@ pub(crate) mod data;
 pub(crate) mod drawing;
 pub(crate) mod effects;
 pub(crate) mod estimation;
+#[cfg(feature = "experiment")]
+mod experiment;
 mod motion;
 pub(crate) mod preparation;
 mod rig;
 pub(crate) mod runs;
 pub(crate) mod separate;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::PathBuf;
@@ -20,6 +23,7 @@ use drawing::DrawingArgs;
 use effects::{AddArgs, EffectsArgs};
 use preparation::PreparationArgs;
 use runs::RunsArgs;
+#[cfg(feature = "workbench")]
 use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
@@ -27,7 +31,9 @@ pub(crate) use data::{
     AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
     ParameterSource, RecordingsArgs, ReportArgs,
 };
-pub(crate) use motion::{CriterionArg, ExciteArgs, ExperimentArgs, SimulateArgs};
+#[cfg(feature = "experiment")]
+pub(crate) use experiment::ExperimentArgs;
+pub(crate) use motion::{CriterionArg, ExciteArgs, SimulateArgs};
 pub(crate) use rig::{ExportArgs, ImportArgs, ReduceArgs};
 
 /// From a model file to base parameters, equations, fast Rust, and parameters from measurements.
@@ -170,6 +176,7 @@ pub(crate) enum ProgramCommand {
         --data recordings/spidermill-mbs/with-rods-fit.csv \\\n      \
         --check recordings/spidermill-mbs/with-rods-check.csv --out report")]
     Report(ReportArgs),
+    #[cfg(feature = "workbench")]
     /// Open a workbench in the browser: edit the model file; mechanism, equations, error and findings are updated
     #[command(after_help = work::HELP)]
     Work(WorkArgs),
@@ -239,6 +246,7 @@ pub(crate) enum ProgramCommand {
         recordings cannot distinguish, `diagnose` prints the command for a motion that does.")]
     Excite(ExciteArgs),
     /// Reproduce the experiment of the paper on the bundled rig, and explain its errors, as one page
+    #[cfg(feature = "experiment")]
     #[command(
         after_help = "Writes experiment.html: excitation, runs of the complete robot, Tables 1 and 2 next to the paper's, \
         and the causes of the errors. Needs no files; the same options give the same bytes.\n\n\

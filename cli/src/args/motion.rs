@@ -87,29 +87,6 @@ pub(crate) struct ExciteArgs {
     pub(crate) separate: SeparateArgs,
 }
 
-/// `experiment`.
-#[derive(Debug, Args)]
-pub(crate) struct ExperimentArgs {
-    /// Write the page `experiment.html` into this folder
-    #[arg(long, value_name = "DIR")]
-    pub(crate) out: PathBuf,
-    /// Random trajectories within the limits that the search for the excitation tries first
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = parse_count)]
-    pub(crate) random: usize,
-    /// How many of the best random trajectories the search starts from
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = parse_count)]
-    pub(crate) starts: usize,
-    /// Seed of the search and of the test trajectory
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub(crate) seed: u64,
-    /// Samples per second of the runs
-    #[arg(long, value_name = "HZ", default_value_t = 200.0, value_parser = parse_rate)]
-    pub(crate) rate: f64,
-    /// Print one JSON object on standard output
-    #[arg(long)]
-    pub(crate) json: bool,
-}
-
 /// Reads a number of harmonics, 1 to 50.
 fn parse_harmonics(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
@@ -119,7 +96,7 @@ fn parse_harmonics(text: &str) -> Result<usize, String> {
 }
 
 /// Reads a number of trajectories, 1 to 1000000.
-fn parse_count(text: &str) -> Result<usize, String> {
+pub(super) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if (1..=1_000_000).contains(&value) => Ok(value),
         _ => Err("expected a whole number from 1 to 1000000".to_owned()),
@@ -135,7 +112,7 @@ fn parse_period(text: &str) -> Result<f64, String> {
 }
 
 /// Reads a sampling rate in samples per second, 1 to 100000.
-fn parse_rate(text: &str) -> Result<f64, String> {
+pub(super) fn parse_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (1.0..=1e5).contains(&value) => Ok(value),
         _ => Err("expected samples per second between 1 and 100000, such as 500".to_owned()),

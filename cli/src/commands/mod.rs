@@ -12,6 +12,7 @@ pub(crate) mod effects;
 pub(crate) mod equations;
 pub(crate) mod evaluate;
 pub(crate) mod excite;
+#[cfg(feature = "experiment")]
 pub(crate) mod experiment;
 pub(crate) mod export;
 pub(crate) mod generate;
@@ -24,6 +25,7 @@ pub(crate) mod report;
 pub(crate) mod runs;
 pub(crate) mod simulate;
 pub(crate) mod tour;
+#[cfg(feature = "workbench")]
 pub(crate) mod work;
 
 use std::path::{Path, PathBuf};

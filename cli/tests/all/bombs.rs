@@ -263,7 +263,7 @@ fn a_log_that_lies_of_its_size_is_refused() {
             log(chunk(128 << 20).repeat(100)),
             "two hundred times",
         ),
-        ("more.mcap", log(chunk(1000)), "more than the file says"),
+        ("more.mcap", log(chunk(1000)), "more than the file declares"),
         ("long.mcap", endless, "larger than 128 MB"),
     ] {
         let path = folder.join(name);

@@ -147,13 +147,16 @@ fn faults_of_sensors_are_named_and_treated() {
     spike[2500][4] = -1e6;
     let (off, says) = identified(&write("spike.csv", &spike), &[]);
     assert!(
-        off < 1.0 && says.contains("1 spike that no drive makes"),
+        off < 1.0 && says.contains("1 spike that no drive can cause"),
         "{says}"
     );
     // Spikes of a million newtons would have moved parameters by many of their deviations.
-    assert!(says.contains("Left in, the faults of sensors in"), "{says}");
+    assert!(
+        says.contains("Without their repair, the sensor faults in"),
+        "{says}"
+    );
     let (_, says) = identified(&write("sound.csv", &all), &[]);
-    assert!(!says.contains("Left in"), "{says}");
+    assert!(!says.contains("Without their repair"), "{says}");
     // A motor's force before a gear of 60 is another quantity.
     let geared: Vec<[f64; 5]> = (all.iter())
         .map(|[t, a, b, left, right]| [*t, *a, *b, left / 60.0, right / -60.0])
@@ -169,7 +172,7 @@ fn faults_of_sensors_are_named_and_treated() {
         row[3] = row[3].clamp(-450.0, 450.0) + 1e-6 * random();
     }
     let (_, says) = identified(&write("clipped.csv", &clipped), &[]);
-    assert!(says.contains("stays at 450 but for noise"), "{says}");
+    assert!(says.contains("stays at 450 except for noise"), "{says}");
 }
 
 /// Measured and predicted force through one low-pass on data that the fit has not seen, %: at most 1.15 times what an expert's

@@ -1,5 +1,5 @@
 //! `diagnose` on recordings with what real sensors, drives and days do to data: the model lacks nothing, and what is wrong is
-//! named. The recordings lie beside the workspace; `cargo bench -p modelmill-cli --bench harsh` scores all of them.
+//! named. The recordings lie beside the workspace; `cargo bench -p modelmill-lab --bench harsh` scores all of them.
 
 use crate::common::{json, scratch, workspace};
 

@@ -7,22 +7,19 @@ use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use crate::common::{json, model, number, printed, run, scratch};
+use modelmill_runtime::RandomBits;
 use serde_json::Value;
 
 const DRIVES: [&str; 2] = ["spindle_left", "spindle_right"];
 /// Standard deviation of the noise on forces of a few hundred newtons, N.
 const NOISE: f64 = 0.5;
 
-/// SplitMix64, as a normal distribution by Box and Muller.
-struct Noise(u64);
+/// A normal distribution by Box and Muller.
+struct Noise(RandomBits);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        ((self.0.bits() >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
     }
 
     fn next(&mut self) -> f64 {
@@ -45,7 +42,7 @@ fn recorded(name: &str, truth: &str, motion: &str, seed: u64) -> String {
     let ((named, forces), (header, motion)) = (rows(&forces), rows(&motion));
     assert_eq!(forces.len(), motion.len());
     let at = DRIVES.map(|drive| named.iter().position(|n| *n == drive).expect("a force"));
-    let mut noise = Noise(seed);
+    let mut noise = Noise(RandomBits::new(seed));
     let mut text = header.join(",") + "\n";
     for (state, force) in motion.iter().zip(&forces) {
         let fields: Vec<String> = header

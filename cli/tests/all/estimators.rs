@@ -344,7 +344,7 @@ fn what_cannot_be_estimated_so_is_said() {
         "--json",
     ]);
     assert!(
-        weak.status == 0 && weak.err.contains("instruments say little"),
+        weak.status == 0 && weak.err.contains("instruments are weak"),
         "{}",
         weak.err
     );

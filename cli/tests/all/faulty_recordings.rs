@@ -109,7 +109,7 @@ fn faults_that_leave_nothing_to_compute_are_refused() {
     refuses(
         &path,
         &[
-            "line 102: column `spindle_left` holds `NaN`",
+            "line 102: column `spindle_left` contains `NaN`",
             "--skip-bad-samples",
         ],
     );
@@ -130,11 +130,11 @@ fn faults_that_leave_nothing_to_compute_are_refused() {
     );
     refuses(
         &table.write("blanks.csv", " "),
-        &["line 1", "what separates the columns"],
+        &["line 1", "the separator of the columns is not clear"],
     );
     refuses(
         &table.write("bars.csv", "|"),
-        &["line 1", "what separates the columns"],
+        &["line 1", "the separator of the columns is not clear"],
     );
     let path = table.spoilt("repeated.csv", |t| t.rows[51] = t.rows[50].clone());
     refuses(
@@ -303,7 +303,7 @@ fn forces_of_another_sign_or_unit_are_named() {
             .flat_map(|map| ["--map", map])
             .collect();
         let (mended, says) = notes(&path, &maps);
-        assert!(!says.contains("nominal values give"), "{says}");
+        assert!(!says.contains("Compared with the nominal values"), "{says}");
         let nominal = number(&mended, "/parameters/0/nominal");
         assert!((number(&mended, "/parameters/0/value") / nominal - 1.0).abs() < 0.5);
     }
@@ -490,7 +490,7 @@ fn columns_may_be_sums_in_other_units() {
         ],
     );
     assert!(
-        says.contains("`mm` does not suit it") && says.contains("`deg`"),
+        says.contains("`mm` does not fit this quantity") && says.contains("`deg`"),
         "{says}"
     );
     let says = refused(

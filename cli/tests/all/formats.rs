@@ -174,7 +174,9 @@ fn files_of_one_run_are_joined() {
     assert!((rare_n - n / 4.0).abs() <= 1.0, "{rare_n} of {n}");
     assert!(rare_error < 1e-5, "{rare_error}");
     assert!(
-        found["data"].to_string().contains("taken at their times"),
+        found["data"]
+            .to_string()
+            .contains("interpolated linearly to them"),
         "{found}"
     );
     let says = refused(
@@ -277,7 +279,7 @@ fn columns_of_motors_are_declared() {
     }
     for (entry, word) in [
         ("joint1 = { ratio = 0 }", "zero"),
-        ("joint1 = {}", "says nothing"),
+        ("joint1 = {}", "is empty"),
         ("q1 = { ratio = 2 }", "unknown drive"),
     ] {
         let text = std::fs::read_to_string(&two_link).expect("a model");

@@ -189,15 +189,15 @@ fn impossible_values_are_pointed_out() {
     let data = whole("negative", 1500, 3.0, -0.5);
     remarked(
         &["identify", &model, "--data", &data],
-        &["p2_min = Fv comes out as -0.", "must be positive"],
+        &["p2_min = Fv is estimated as -0.", "must be positive"],
     );
     let data = whole("heavy", 1500, -3.0, 0.5);
     remarked(
         &["identify", &model, "--data", &data],
-        &["p1_min = M comes out as -", "must be positive"],
+        &["p1_min = M is estimated as -", "must be positive"],
     );
     let (err, _) = both(&["identify", &model, "--data", &whole("fine", 1500, 3.0, 0.5)]);
-    assert!(!err.contains("physical sense"), "{err}");
+    assert!(!err.contains("physically possible"), "{err}");
     let model = cart("light", "\"M\"", &MASS.replace('3', "-3"));
     let checked = json(&["check", &model, "--json"]);
     assert!(
@@ -247,11 +247,11 @@ fn a_recording_given_twice_is_said() {
     std::fs::copy(&data, &copy).expect("a copy");
     remarked(
         &["identify", &model, "--data", &data, "--data", &copy],
-        &["copy.csv are the same recording", "it counts twice"],
+        &["copy.csv are the same recording", "it has double weight"],
     );
     remarked(
         &["identify", &model, "--data", &data, "--check", &data],
-        &["such a check proves nothing"],
+        &["such a validation proves nothing"],
     );
     let (err, _) = both(&["identify", &model, "--data", &data, "--check", &other]);
     assert_eq!(err, "");
@@ -293,7 +293,7 @@ fn undetermined_parameters_stay_where_it_is_said() {
     });
     let (err, _) = both(&["identify", &model, "--data", &data]);
     assert!(
-        err.contains("nearest to the nominal ones are taken: p1_min = ")
+        err.contains("nearest to the nominal ones are used: p1_min = ")
             && err.contains("(nominal 3.00000)"),
         "{err}"
     );
@@ -342,7 +342,10 @@ fn columns_of_one_letter_are_not_proposed_for_one_another() {
     for columns in ["t,y,motor", "s,x,motor", "t,s,motor"] {
         let data = recording("letters", columns, 50, |[t, x, ..]| vec![t, x, 0.0]);
         let says = refused(1, &["compare", &model, "--data", &data]);
-        assert!(!says.contains("meant?") && says.contains("--map"), "{says}");
+        assert!(
+            !says.contains("did you mean") && says.contains("--map"),
+            "{says}"
+        );
     }
     // A column that the model itself wants is not proposed for another one.
     let data = recording("theta", "t,theta1,motor", 50, |[t, x, ..]| vec![t, x, 0.0]);
@@ -356,7 +359,8 @@ fn columns_of_one_letter_are_not_proposed_for_one_another() {
         ],
     );
     assert!(
-        says.contains("there is no column `theta2`. The columns are") && !says.contains("meant?"),
+        says.contains("there is no column `theta2`. The columns are")
+            && !says.contains("did you mean"),
         "{says}"
     );
 }
@@ -646,7 +650,7 @@ fn a_rank_without_a_clear_gap_is_said_to_be_none() {
     assert!(gap > 1.0 && gap < 1e3, "{gap}");
     for command in ["check", "equations"] {
         let said = ran(&[command, &file]).err;
-        assert!(said.contains("stands on a small gap of"), "{said}");
+        assert!(said.contains("is based on a small gap of"), "{said}");
     }
     // The condition of the columns that are retained is poor, and the note beside the page says what the rank is worth.
     let said = ran(&["equations", &file]).err;

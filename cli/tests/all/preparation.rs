@@ -109,7 +109,7 @@ fn a_series_is_taken_where_forces_tell_that_it_leaves_less() {
     };
     let (series, says) = off(&[]);
     assert!(
-        says.contains("is taken for a Fourier series of period 7.29"),
+        says.contains("is fitted by a Fourier series of period 7.29"),
         "{says}"
     );
     let (filtered, _) = off(&["--smoothing", "butterworth"]);

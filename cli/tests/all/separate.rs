@@ -332,7 +332,7 @@ fn what_no_motion_tells_apart_is_refused_with_its_reason() {
     let directional = "directional_coulomb_friction@spindle_left";
     let says = refusal(1, &["--separate", LEFT, "--from", directional]);
     assert!(
-        says.contains("no experiment tells coulomb friction"),
+        says.contains("no experiment distinguishes coulomb friction"),
         "{says}"
     );
     let values = format!("{directional}:Fcp=20:Fcn=10");
@@ -365,7 +365,7 @@ fn what_no_motion_tells_apart_is_refused_with_its_reason() {
         ],
     );
     assert!(
-        says.contains("base parameters take up") && says.contains("point mass (R2m)"),
+        says.contains("base parameters absorb") && says.contains("point mass (R2m)"),
         "{says}"
     );
 }

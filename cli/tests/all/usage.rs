@@ -288,7 +288,7 @@ fn what_stands_in_the_wrong_place_is_named() {
     ];
     let says = refused(1, &compare);
     assert!(
-        says.contains("is no fit") && says.contains("recordings go to `--data`"),
+        says.contains("is not a fit") && says.contains("pass recordings to `--data`"),
         "{says}"
     );
     let out = scratch("no-rig.csv");

@@ -132,7 +132,7 @@ fn motions_are_enough() {
     assert!(
         along["notes"]
             .to_string()
-            .contains("neither model is held against")
+            .contains("neither model is compared with")
     );
     assert!(number(along, "/drives/0/difference/rms") > 10.0);
     // Both are read as the options say.

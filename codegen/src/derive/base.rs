@@ -1,4 +1,4 @@
-//! What a derivation says about its base parameters: names, expressions, units and values.
+//! Base parameters of a derivation: names, expressions, units and values.
 
 use num_rational::BigRational;
 use num_traits::One;
@@ -9,7 +9,7 @@ use crate::expr::print::PrintedFormula;
 use crate::reduce::base;
 use crate::tree::expressions::ParameterMonomial;
 
-/// One base parameter, for people and programs.
+/// One base parameter as texts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BaseParameterEntry {
     /// `p1_min`, `p2_min`, ...
@@ -18,12 +18,12 @@ pub struct BaseParameterEntry {
     pub retained: String,
     /// Eq. (16): the parameter as an expression of dynamic parameters and constants.
     pub expression: String,
-    /// SI unit.
+    /// Its SI unit.
     pub unit: String,
 }
 
 impl Derivation {
-    /// Indices of the active and of the passive coordinates.
+    /// Indices of the active coordinates and of the passive coordinates, in the order of the model file.
     pub fn coordinates(&self) -> (Vec<usize>, Vec<usize>) {
         (
             self.equations.projection.loops.active.clone(),
@@ -36,6 +36,7 @@ impl Derivation {
         let reduction = &self.reduction;
         (0..reduction.retained.len())
             .map(|k| {
+                // Unit and name are those of the retained product.
                 let product = &reduction.products[reduction.retained[k]];
                 BaseParameterEntry {
                     name: base::base_parameter_name(k),
@@ -47,8 +48,8 @@ impl Derivation {
             .collect()
     }
 
-    /// Sums that base parameters refer to, with their expressions, each after those that it needs; none unless base
-    /// parameters that are written out would be too long to read.
+    /// Named sums that base parameters refer to, with their expressions, each after those that it needs. Empty unless
+    /// expanded base parameters would be too long to read.
     pub fn base_sums(&self) -> Vec<(String, String)> {
         let sums = base::dependent_sums(&self.mechanism, &self.reduction).into_iter();
         sums.map(|(name, formula)| (name, formula.text())).collect()
@@ -63,6 +64,7 @@ impl Derivation {
             )
         };
         let lines = self.reduction.dependencies.iter().map(|line| {
+            // Retained products first, then dependent ones.
             let retained = line.equals.iter();
             let retained = retained.map(|(k, factor)| (self.reduction.retained[*k], factor));
             let via = line.via.iter().map(|(product, factor)| (*product, factor));
@@ -79,10 +81,12 @@ impl Derivation {
         lines.collect()
     }
 
-    /// Values of the base parameters for given parameters and constants, both in the order of the model file.
+    /// Values of the base parameters for given parameters and constants, both in the order of the model file, in SI
+    /// units.
     pub fn base_values(&self, parameters: &[f64], constants: &[f64]) -> Vec<f64> {
         let reduction = &self.reduction;
         let value = |product: usize| reduction.products[product].value(parameters);
+        // The retained product itself, then the dependent ones with their factors.
         let mut base: Vec<f64> = reduction.retained.iter().map(|k| value(*k)).collect();
         for (line, factors) in reduction
             .dependencies
@@ -109,6 +113,7 @@ impl Derivation {
         let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> = retained
             .map(|k| vec![(product(*k), BigRational::one())])
             .collect();
+        // Factors by exact values of the constants.
         let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));
         let factors = factors.expect("numbers have a value for everything");
         for (line, factors) in reduction.dependencies.iter().zip(factors) {
@@ -119,8 +124,8 @@ impl Derivation {
         polynomials
     }
 
-    /// Values of the base parameters for the model file's values: identified ones where it has them, by the expression of
-    /// the base parameter, or else those of the nominal parameters.
+    /// Values of the base parameters for the model file's values. Identified values are used where the file has them,
+    /// matched by expression; all others follow from the nominal parameters.
     pub fn nominal_base_values(&self) -> Vec<f64> {
         let parameters: Vec<f64> = self
             .mechanism
@@ -136,7 +141,7 @@ impl Derivation {
         values
     }
 
-    /// The identified values that the model file has of its base parameters, by their positions.
+    /// The identified values of the model file, by index of the base parameter.
     pub fn identified_base(&self) -> Vec<(usize, f64)> {
         let identified = &self.mechanism.identified_base;
         if identified.is_empty() {

@@ -1,10 +1,10 @@
-//! How many digits the base leaves: forces from p_min go beside those from p_g, both in floating point and on the model
-//! file's own values. They are equal in exact arithmetic.
+//! Digits lost by the base: forces from p_min are compared with those from p_g, both in floating point and with the
+//! model file's values. They are equal in exact arithmetic.
 //!
-//! Retained columns are independent for general constants. At the file's values they may all but coincide; factors of
-//! eq. (6) then grow without bound, and what the forces have in common is lost when huge terms cancel. With growth `g` of the
-//! terms beside their sum the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham, "Accuracy and
-//! Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
+//! Retained columns are independent for general constants. At the file's values they may be almost dependent. Then the
+//! factors of eq. (6) are very large, and digits of the forces are lost when large terms cancel. If the terms are `g`
+//! times larger than their sum, the relative error of the forces is about `g` roundings of 1.1e-16 (N. J. Higham,
+//! "Accuracy and Stability of Numerical Algorithms", 2nd ed. 2002, 4.2).
 
 use modelmill_spec::Mechanism;
 use nalgebra::DMatrix;
@@ -14,27 +14,27 @@ use crate::loops::numeric_poses::uniform_symmetric;
 use crate::{Derivation, DeriveError};
 use modelmill_algebra::field::RandomStream;
 
-/// Error of a drive's force, relative to the sum of what its products add to it, beyond which a base is refused. Errors of a
-/// millionth count as rounding of a recording's numbers elsewhere; ten of sixteen digits may be lost up to there.
+/// Largest accepted error of a drive's force, relative to the sum of the magnitudes of its terms. Elsewhere, errors of
+/// a millionth count as rounding of a recording's numbers; here up to ten of sixteen digits may be lost.
 const MOST_LOST: f64 = 1e-6;
 
-/// At how many states forces are held beside each other, and how many are tried.
+/// Number of states at which forces are compared.
 const STATES: usize = 8;
+/// Number of random states that are tried to find them.
 const TRIES: usize = 100;
 
-/// How far states lie from the nominal pose, in rad and relative to the nominal length; by what it shrinks where the
-/// mechanism cannot stand.
+/// Distance of the states from the nominal pose, in rad and relative to the nominal length.
 const REACH: f64 = 0.5;
+/// Factor by which the distance shrinks after a state without a solution.
 const SHRINK_FACTOR: f64 = 0.8;
 
-/// Dependent products whose factors are nearly as large as the largest ones are named as well.
+/// Products whose terms are larger than this part of the largest one are named in the message.
 const NEARLY_LARGEST: f64 = 1e-3;
 
-/// That forces from p_min agree with those from p_g. Where no state is found at which the mechanism can stand, nothing is
-/// refused.
+/// Returns an error if forces from p_min differ from those from p_g. If no state has a solution, the base is accepted.
 pub(crate) fn check_lost_digits(derivation: &Derivation) -> Result<(), DeriveError> {
     match largest_digit_loss(derivation)? {
-        // What is no number has lost all digits.
+        // NaN means that all digits are lost.
         Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => {
             Err(lost_digits_error(derivation, &lost))
         }
@@ -42,28 +42,29 @@ pub(crate) fn check_lost_digits(derivation: &Derivation) -> Result<(), DeriveErr
     }
 }
 
-/// What the drive loses that loses most.
+/// The drive with the largest error.
 struct DigitLoss {
-    /// Error of its force, relative to the sum of what its products add to it.
+    /// Error of its force, relative to the sum of the magnitudes of its terms.
     error: f64,
-    /// Its row of H, state by state.
+    /// Its rows of H, one per state.
     h: DMatrix<f64>,
     /// Values of the products.
     values: Vec<f64>,
 }
 
-/// Holds forces from p_min against those from p_g; `None` where nothing is regrouped or no state is found.
+/// Compares forces from p_min with those from p_g; `None` if nothing was regrouped or no state has a solution.
 fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, DeriveError> {
     if derivation.reduction.dependencies.is_empty() {
         return Ok(None);
     }
+    // Products without a nominal value would hide the loss of their column.
     let mechanism = with_all_parameters(&derivation.mechanism);
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
     let constants: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let products = &derivation.reduction.products;
     let values: Vec<f64> = products.iter().map(|p| p.value(&parameters)).collect();
     let evaluator = ModelEvaluator::new(derivation).with_parameters(&mechanism);
-    // Evaluator and emitted code add up eq. (7) in different orders.
+    // Evaluator and emitted code sum eq. (7) in different orders, so both are compared.
     let both = [
         derivation.base_values(&parameters, &constants),
         evaluator.base_parameters(),
@@ -72,6 +73,7 @@ fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, Deri
         return Ok(None);
     };
     let n_drives = mechanism.drives.len();
+    // The largest error of all drives decides.
     let errors = (0..n_drives).map(|d| (d, sampled.relative_force_error(d, n_drives, &values)));
     let worst = errors.max_by(|a, b| a.1.total_cmp(&b.1));
     Ok(worst.map(|(drive, error)| DigitLoss {
@@ -83,7 +85,7 @@ fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, Deri
     }))
 }
 
-/// The mechanism with a value for every parameter: where the file gives none, the largest of the same unit stands in, or 1.
+/// The mechanism with a value for every parameter: one without gets the largest value of the same unit, or 1.
 fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
     let mut all = mechanism.clone();
     for parameter in all.parameters.iter_mut().filter(|p| p.nominal == 0.0) {
@@ -97,16 +99,16 @@ fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
     all
 }
 
-/// H and forces at some states around the nominal pose.
+/// H and forces at some states near the nominal pose.
 struct ForceSamples {
-    /// H, drives within states.
+    /// H, with one row per state and drive, states outermost.
     full: DMatrix<f64>,
-    /// Forces from p_min, `[way of adding up p_min][drive][state]`.
+    /// Forces from p_min, `[order of summation][drive][state]`.
     forces: [Vec<Vec<f64>>; 2],
 }
 
 impl ForceSamples {
-    /// `None` where no state is found; an error where forces are no finite numbers at any.
+    /// Samples up to `STATES` states. `None` if none has a solution; an error if forces are not finite at any of them.
     fn new(
         mechanism: &Mechanism,
         evaluator: &ModelEvaluator<'_>,
@@ -116,11 +118,14 @@ impl ForceSamples {
         let n_drives = mechanism.drives.len();
         let mut rows: Vec<f64> = Vec::new();
         let mut forces = [vec![Vec::new(); n_drives], vec![Vec::new(); n_drives]];
+        // Numbers of usable states and of states with infinite forces, and the current distance.
         let (mut n_states, mut n_infinite, mut reach) = (0, 0, REACH);
         for _ in 0..TRIES {
+            // Enough states have been found.
             if n_states == STATES {
                 break;
             }
+            // H and both forces at the same state.
             let state = NearbyState::random_near_nominal(mechanism, reach, &mut stream);
             let states = state.as_motion_states();
             let found = evaluator.full_regressor(&states).and_then(|h| {
@@ -131,6 +136,7 @@ impl ForceSamples {
                 ];
                 Ok((h, forces))
             });
+            // Closer to the nominal pose, loops are more likely to close.
             let Ok((h, found)) = found else {
                 reach *= SHRINK_FACTOR;
                 continue;
@@ -150,13 +156,14 @@ impl ForceSamples {
             }
             n_states += 1;
         }
+        // Without a usable state the reason decides.
         if n_states == 0 {
             return if n_infinite == 0 {
                 Ok(None)
             } else {
                 Err(DeriveError::NotFinite {
                     what: "with the model file's values, the force of a drive".to_owned(),
-                    todo: "look for constants that are too large to be squared, such as lengths beyond 1e150",
+                    todo: "check for constants that are too large to be squared, such as lengths above 1e150",
                 })
             };
         }
@@ -165,14 +172,16 @@ impl ForceSamples {
         Ok(Some(Self { full, forces }))
     }
 
+    /// Number of states.
     fn n_states(&self) -> usize {
         self.forces[0].first().map_or(0, Vec::len)
     }
 
-    /// Error of a drive's force, relative to the sum of what its products add to it.
+    /// Error of a drive's force over all states, relative to the sum of the magnitudes of its terms.
     fn relative_force_error(&self, drive: usize, n_drives: usize, values: &[f64]) -> f64 {
         let (mut errors, mut size) = ([0.0; 2], 0.0);
         for state in 0..self.n_states() {
+            // The force from p_g, as a sum of terms.
             let row = self.full.row(state * n_drives + drive);
             let terms = row.iter().zip(values).map(|(h, p)| h * p);
             let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| {
@@ -184,7 +193,7 @@ impl ForceSamples {
             }
         }
         let [a, b] = errors;
-        // `max` would pass over what is no number.
+        // `f64::max` would ignore NaN.
         let worst = if a > b || a.is_nan() { a } else { b };
         if worst == 0.0 {
             return 0.0;
@@ -193,16 +202,22 @@ impl ForceSamples {
     }
 }
 
-/// A state near the nominal pose.
+/// A random state near the nominal pose.
 struct NearbyState {
+    /// Active coordinates, rad or m.
     q: Vec<f64>,
+    /// Rates, rad/s or m/s.
     qd: Vec<f64>,
+    /// Accelerations, rad/s^2 or m/s^2.
     qdd: Vec<f64>,
+    /// Forces of the drives, N or N m.
     load: Vec<f64>,
 }
 
 impl NearbyState {
+    /// Draws a state; lengths scale with their nominal value.
     fn random_near_nominal(mechanism: &Mechanism, reach: f64, stream: &mut RandomStream) -> Self {
+        // Passive coordinates follow from the loops.
         let active: Vec<_> = (mechanism.coordinates.iter())
             .filter(|c| !c.passive)
             .collect();
@@ -225,6 +240,7 @@ impl NearbyState {
         }
     }
 
+    /// The state as arrays of length one.
     fn as_motion_states(&self) -> MotionStates<'_> {
         MotionStates {
             q: self.q.chunks(1).collect(),
@@ -235,14 +251,14 @@ impl NearbyState {
     }
 }
 
-/// Which products lose the digits.
+/// The error for a base that loses digits, with the products whose terms are largest.
 fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError {
     let constants = derivation.mechanism.constants.iter();
     let constants: Vec<f64> = constants.map(|c| c.value).collect();
     let reduction = &derivation.reduction;
     let name = |product: usize| reduction.products[product].text(&derivation.mechanism);
     let norm = |product: usize| found.h.column(product).norm();
-    // Terms of each dependent product, by retained column.
+    // Magnitudes of the terms of each dependent product, by retained column.
     let lines: Vec<(usize, Vec<(usize, f64)>)> = reduction
         .dependencies
         .iter()
@@ -251,7 +267,7 @@ fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError 
             let terms = factors.iter().map(|(k, factor)| {
                 let retained = reduction.retained[*k];
                 let term = factor * found.values[line.product] * norm(retained);
-                // What is no number is larger than any.
+                // NaN counts as infinite.
                 (
                     retained,
                     if term.is_nan() {
@@ -264,6 +280,7 @@ fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError 
             (line.product, terms.collect())
         })
         .collect();
+    // Lines with the largest terms, and the retained products in them.
     let largest = |terms: &[(usize, f64)]| terms.iter().map(|t| t.1).fold(0.0, f64::max);
     let all = lines
         .iter()
@@ -272,6 +289,7 @@ fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError 
     let worst = lines
         .iter()
         .filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
+    // Names for the message.
     let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
     let mut retained: Vec<usize> = worst
         .flat_map(|(_, terms)| terms)
@@ -312,7 +330,7 @@ mod tests {
             .mechanism
     }
 
-    /// What makes a file ask for the masses instead of the body's own products.
+    /// A line of the model file that retains the masses instead of the body's own products.
     const MASSES: &str = "retain = [\"m1\", \"m2\"]";
 
     /// A pendulum whose masses at `a` and `a + gap` are declared before the body that carries them.
@@ -358,8 +376,8 @@ mod tests {
         ))
     }
 
-    /// Error of the pendulum's torque by p_min beside the formula of a textbook, relative to its size; p_min as the evaluator
-    /// and as emitted code adds it up.
+    /// Error of the pendulum's torque from p_min compared with the textbook formula, relative to its size. p_min is
+    /// summed as in the evaluator and as in emitted code.
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
         let evaluator = ModelEvaluator::new(derivation);
@@ -390,8 +408,8 @@ mod tests {
         })
     }
 
-    /// From gaps that cost nothing to gaps that leave nothing: refused is what loses more than a millionth, by a formula
-    /// that knows nothing of the reduction.
+    /// From gaps without loss to gaps that lose all digits: a base that loses more than a millionth is refused. The
+    /// formula of the comparison does not use the reduction.
     #[test]
     fn a_base_is_refused_where_its_forces_are_wrong_and_only_there() {
         for exponent in 1..=16 {
@@ -417,8 +435,8 @@ mod tests {
         }
     }
 
-    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they are
-    /// divided by are exact.
+    /// The evaluator's base parameters lose one rounding per growth of the factors, not two: the differences that they
+    /// are divided by are exact.
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
@@ -447,8 +465,8 @@ mod tests {
         assert_eq!(dependent, ["ZZ1", "MX1"]);
     }
 
-    /// The body's own products are retained, and those of masses follow without quotients; so with numbers that a reader
-    /// takes for one, as a spreadsheet writes 3 * 0.1.
+    /// The body's own products are retained, and those of masses depend on them without quotients. So it is with
+    /// numbers that differ only by rounding, such as 0.3 and 3 * 0.1.
     #[test]
     fn masses_that_coincide_do_not_stand_for_their_body() {
         for b in [0.3, 0.300_000_000_000_000_04, 0.3 + 1e-9, 0.31, 0.9] {
@@ -481,7 +499,7 @@ mod tests {
         ))
     }
 
-    /// Two of the masses make up all others: those are retained that differ.
+    /// All masses depend on two of them: two whose positions differ are retained.
     #[test]
     fn columns_that_coincide_are_not_retained_together() {
         for gap in [0.0, 1e-16, 1e-12, 1e-7, 1e-3] {
@@ -569,7 +587,7 @@ mod tests {
         }
     }
 
-    /// What parameters are worth does not hide what factors lose.
+    /// Values of parameters do not hide the digits that factors lose.
     #[test]
     fn parameters_without_values_stand_for_those_of_their_unit() {
         let mut mechanism = pendulum(1e-14, MASSES);
@@ -583,7 +601,7 @@ mod tests {
         );
     }
 
-    /// Numbers in, digits out: sound models lose next to none.
+    /// Consistent models lose almost no digits.
     #[test]
     fn sound_models_are_far_from_the_threshold() {
         for name in [

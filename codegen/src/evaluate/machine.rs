@@ -1,5 +1,5 @@
-//! The machine that runs a program over blocks of states: values in reusable slots, each a block wide, and one loop per
-//! operation, in the widest vectors of the processor that runs it.
+//! The machine that runs a program over blocks of states. Values are in reusable slots of one block each, and every
+//! operation is one loop, in the widest vectors of the processor that runs it.
 
 use std::cell::RefCell;
 
@@ -11,17 +11,19 @@ use crate::ValueId;
 use crate::expr::{Atom, Unary};
 use crate::lower::{PoseGuard, ProgramOp, ProgramStage, StraightLineProgram};
 
-/// States per block: small enough for the cache, large enough to hide the interpretation.
+/// States per block: few enough for the cache, and many enough that interpreting the program costs little.
 const BLOCK: usize = 64;
 
-/// A program for one state at a time, as Newton's method needs it.
+/// A program that runs for one state at a time, as Newton's method needs it.
 pub(super) struct SingleStateProgram<'a> {
+    /// The program.
     program: &'a StraightLineProgram,
-    /// Values of all operations; those of the fixed stage stay.
+    /// Values of all operations; those of the fixed stage are computed once.
     values: RefCell<Vec<f64>>,
 }
 
 impl<'a> SingleStateProgram<'a> {
+    /// Takes over the fixed values of a machine.
     pub(super) fn new(machine: RegisterMachine<'a>) -> Self {
         Self {
             program: machine.program,
@@ -29,13 +31,14 @@ impl<'a> SingleStateProgram<'a> {
         }
     }
 
-    /// Runs the program and reads what is wanted of its outputs.
+    /// Runs the program at one state; `read` gets a function that returns output k.
     pub(super) fn run<R>(
         &self,
         input: impl Fn(Atom) -> f64,
         read: impl FnOnce(&dyn Fn(usize) -> f64) -> R,
     ) -> R {
         let mut values = self.values.borrow_mut();
+        // Only operations of the state are computed.
         let ops = self.program.ops.iter().zip(&self.program.stages);
         for (i, (op, stage)) in ops.enumerate() {
             if *stage == ProgramStage::State {
@@ -49,57 +52,68 @@ impl<'a> SingleStateProgram<'a> {
     }
 }
 
-/// A program with its fixed stage done and its values assigned to reusable slots.
+/// A program with its fixed stage computed and its values assigned to reusable slots.
 pub(super) struct RegisterMachine<'a> {
+    /// The program.
     program: &'a StraightLineProgram,
-    /// Values of the fixed stage.
+    /// Values of the fixed stage by operation.
     fixed: Vec<f64>,
-    /// Those among them that the state stage needs, with their slots.
+    /// Fixed values that the state stage reads, with their slots.
     kept: Vec<(usize, f64)>,
-    /// What is done to every block, in order.
+    /// Instructions for every block, in order.
     steps: Vec<SlotInstruction>,
-    /// Slot of each operation of the state stage, and of fixed values that are needed there.
+    /// Slot of each operation of the state stage, and of fixed values that it reads.
     slots: Vec<usize>,
-    /// Slot of each output; of those that are not wanted one that stays zero.
+    /// Slot of each output; outputs that are not wanted share a slot that stays zero.
     outputs: Vec<usize>,
+    /// Number of slots of the memory.
     n_slots: usize,
 }
 
-/// One operation on slots; the target stands first and is never an operand.
+/// One operation on slots; the target comes first and is never an operand.
 #[derive(Clone, Copy, Debug)]
 enum SlotInstruction {
+    /// Copies an input.
     Input(usize, Atom),
+    /// `a + b`
     Add(usize, usize, usize),
+    /// `a - b`
     Sub(usize, usize, usize),
+    /// `a * b`
     Mul(usize, usize, usize),
+    /// `a / b`
     Div(usize, usize, usize),
+    /// Angle of a point, operands y and x.
     Atan2(usize, usize, usize),
+    /// `-a`
     Neg(usize, usize),
+    /// A function of one operand.
     Unary(usize, Unary, usize),
-    /// Sine and cosine of the last one; a slot of its own takes the one that nobody needs.
+    /// Sine and cosine of the third slot; a value that is not needed goes to a spare slot.
     SinCos(usize, usize, usize),
 }
 
-/// Outputs of a program for some states.
+/// Outputs of a program for the states of one block.
 pub(super) struct OutputBlock<'m> {
-    /// How many states.
+    /// Number of states.
     pub(super) len: usize,
-    /// One slice of that length per output.
+    /// One slice of this length per output.
     pub(super) columns: Vec<&'m [f64]>,
 }
 
 impl<'a> RegisterMachine<'a> {
-    /// For all outputs.
+    /// A machine for all outputs; `atom` gives the values of fixed inputs.
     pub(super) fn new(program: &'a StraightLineProgram, atom: impl Fn(Atom) -> f64) -> Self {
         Self::for_outputs(program, &|_| true, atom)
     }
 
-    /// For some outputs; the others are zero, and what only they need is not computed.
+    /// A machine for some outputs. The others are zero, and operations that only they need are skipped.
     pub(super) fn for_outputs(
         program: &'a StraightLineProgram,
         wanted: &dyn Fn(usize) -> bool,
         atom: impl Fn(Atom) -> f64,
     ) -> Self {
+        // The fixed stage is computed here, once.
         let computed = program.needed_operations(wanted);
         let mut fixed = vec![0.0; program.ops.len()];
         for (i, op) in program.ops.iter().enumerate() {
@@ -110,6 +124,7 @@ impl<'a> RegisterMachine<'a> {
                 };
             }
         }
+        // The last operation that reads each value, and whether the state stage or the caller reads it.
         let mut last_use: Vec<usize> = (0..program.ops.len()).collect();
         let mut needed = vec![false; program.ops.len()];
         let ops = program.ops.iter().enumerate();
@@ -122,19 +137,21 @@ impl<'a> RegisterMachine<'a> {
         }
         let outputs = program.outputs.iter().enumerate();
         let outputs = outputs.filter(|(k, _)| wanted(*k)).map(|(_, value)| *value);
+        // Outputs and guarded values live until the end of the block.
         for value in outputs.chain(program.guards.iter().flat_map(|g| g.values())) {
             last_use[value.index()] = program.ops.len();
             needed[value.index()] = true;
         }
         let mut slots = vec![0; program.ops.len()];
         let (mut free, mut n_slots): (Vec<usize>, usize) = (Vec::new(), 0);
-        // Fixed values keep their slots.
+        // Fixed values have slots that are never reused.
         for i in (0..program.ops.len()).filter(|i| program.stages[*i] == ProgramStage::Fixed) {
             if needed[i] {
                 slots[i] = n_slots;
                 n_slots += 1;
             }
         }
+        // Slots of other values are free again after their last use.
         let mut ends: Vec<Vec<usize>> = vec![Vec::new(); program.ops.len() + 1];
         for i in 0..program.ops.len() {
             if computed[i] && program.stages[i] == ProgramStage::State {
@@ -150,7 +167,7 @@ impl<'a> RegisterMachine<'a> {
             .filter(|i| needed[*i] && program.stages[*i] == ProgramStage::Fixed)
             .map(|i| (slots[i], fixed[i]))
             .collect();
-        // Where only one of sine and cosine is needed, the other goes here.
+        // The spare slot takes the sine or cosine that is not needed; the zero slot is never written.
         let (spare, zero) = (n_slots, n_slots + 1);
         let steps = slot_instructions(program, &computed, &slots, spare);
         let outputs = program.outputs.iter().enumerate();
@@ -172,13 +189,15 @@ impl<'a> RegisterMachine<'a> {
         }
     }
 
-    /// Runs over `n` states and shows the outputs block by block.
+    /// Runs over `n` states and passes the outputs to `visit` block by block. Fails at the first state at which a guard
+    /// is not satisfied, and if `visit` fails.
     pub(super) fn run<'s, E: From<PoseFault>>(
         &self,
         n: usize,
         input: impl Fn(Atom) -> &'s [f64],
         mut visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
+        // Inputs by instruction, so that they are looked up once and not per block.
         let inputs: Vec<&[f64]> = self
             .steps
             .iter()
@@ -187,13 +206,17 @@ impl<'a> RegisterMachine<'a> {
                 _ => &[],
             })
             .collect();
+        // Slots that are never written stay zero.
         let mut memory = vec![[0.0; BLOCK]; self.n_slots];
+        // Fixed values fill their slots once for all blocks.
         for (slot, value) in &self.kept {
             memory[*slot] = [*value; BLOCK];
         }
+        // The vector width of this processor.
         let arch = Arch::new();
         let mut start = 0;
         while start < n {
+            // The last block may be shorter.
             let len = BLOCK.min(n - start);
             arch.dispatch(BlockExecution {
                 steps: &self.steps,
@@ -210,6 +233,7 @@ impl<'a> RegisterMachine<'a> {
                 let sample = start + k;
                 return Err(PoseFault { sample, reason }.into());
             }
+            // Results are borrowed, not copied.
             let columns = self.outputs.iter().map(|slot| &memory[*slot][..len]);
             visit(&OutputBlock {
                 len,
@@ -220,9 +244,11 @@ impl<'a> RegisterMachine<'a> {
         Ok(())
     }
 
-    /// The first state of a block at which a guard fails, and the guard: of several, the one that emitted code sees first.
+    /// The first state of a block at which a guard is not satisfied, and this guard. Of several guards at one state it
+    /// is the one that emitted code checks first.
     fn first_fault(&self, len: usize, memory: &[[f64; BLOCK]]) -> Option<(usize, PoseGuard)> {
         let failing = self.program.guards.iter().filter_map(|guard| {
+            // All states of the block are checked at once.
             let values = self.block_values(guard.value(), memory);
             let size = guard
                 .reference_size()
@@ -232,17 +258,18 @@ impl<'a> RegisterMachine<'a> {
                 .position(|v| !guard.is_satisfied(*v, size))?;
             Some((k, *guard))
         });
-        // Fixed values come before those of a state there.
+        // Emitted code checks fixed values before those of a state.
         let stage = |guard: &PoseGuard| self.program.stages[guard.value().index()];
         failing.min_by_key(|(k, guard)| (*k, stage(guard), guard.value()))
     }
 
+    /// The values of an operation at the states of a block.
     fn block_values<'m>(&self, value: ValueId, memory: &'m [[f64; BLOCK]]) -> &'m [f64; BLOCK] {
         &memory[self.slots[value.index()]]
     }
 }
 
-/// The state stage on slots.
+/// The instructions of the state stage.
 fn slot_instructions(
     program: &StraightLineProgram,
     computed: &[bool],
@@ -267,7 +294,8 @@ fn slot_instructions(
             ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => {
                 SlotInstruction::SinCos(spare, to, slot(a))
             }
-            // The cosine of the same angle stands right before the sine if both are needed; the angle is still there.
+            // If both are needed, the cosine of the same angle is the operation before the sine, and the slot of the
+            // angle is not reused yet.
             ProgramOp::Sin(a)
                 if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) =>
             {
@@ -290,19 +318,23 @@ fn slot_instructions(
     steps
 }
 
-/// All steps on one block of states.
+/// The execution of all instructions on one block of states.
 struct BlockExecution<'a, 's> {
+    /// The instructions.
     steps: &'a [SlotInstruction],
-    /// What each step reads, if it is an input.
+    /// Per instruction the array that it reads, if it is an input.
     inputs: &'a [&'s [f64]],
+    /// Range of the states.
     states: std::ops::Range<usize>,
+    /// The slots.
     memory: &'a mut [[f64; BLOCK]],
 }
 
 impl WithSimd for BlockExecution<'_, '_> {
     type Output = ();
 
-    #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
+    // The vector width is chosen by the caller, so everything below must be inlined.
+    #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let memory = self.memory;
@@ -321,7 +353,7 @@ impl WithSimd for BlockExecution<'_, '_> {
                 SlotInstruction::Unary(to, Unary::Abs, a) => apply_unary(memory, to, a, f64::abs),
                 SlotInstruction::Unary(to, Unary::Sign, a) => apply_unary(memory, to, a, sign),
                 SlotInstruction::Unary(to, function, a) => {
-                    apply_unary(memory, to, a, |x| evaluate_unary(function, x))
+                    apply_unary(memory, to, a, |x| evaluate_unary(function, x));
                 }
                 SlotInstruction::SinCos(sin, cos, a) => {
                     let [sin, cos, a] = distinct_slots(memory, [sin, cos, a]);
@@ -332,6 +364,7 @@ impl WithSimd for BlockExecution<'_, '_> {
     }
 }
 
+/// The slots as distinct arrays. A target is never an operand, so this cannot fail.
 fn distinct_slots<const N: usize>(
     memory: &mut [[f64; BLOCK]],
     slots: [usize; N],
@@ -345,6 +378,7 @@ fn distinct_slots<const N: usize>(
     clippy::inline_always,
     reason = "a function of its own would be compiled for the narrowest vectors"
 )]
+/// `to = operation(a)` on all states of a block.
 #[inline(always)]
 fn apply_unary(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl Fn(f64) -> f64) {
     let [to, a] = distinct_slots(memory, [to, a]);
@@ -353,7 +387,8 @@ fn apply_unary(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl
     }
 }
 
-/// Generic, so that each operation is a loop of its own that the compiler can make wide.
+/// `to = operation(a, b)` on all states of a block. It is generic, so that every operation is a loop that the compiler
+/// can vectorise.
 #[allow(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn apply_binary(
@@ -372,7 +407,7 @@ fn apply_binary(
     }
 }
 
-/// -1, 0 or 1; what is no number stays what it is.
+/// -1, 0 or 1; NaN stays NaN.
 #[allow(clippy::inline_always, reason = "as above")]
 #[inline(always)]
 fn sign(x: f64) -> f64 {
@@ -385,6 +420,7 @@ fn sign(x: f64) -> f64 {
     }
 }
 
+/// A function of one operand at one state.
 fn evaluate_unary(function: Unary, x: f64) -> f64 {
     match function {
         Unary::Sqrt => x.sqrt(),
@@ -397,6 +433,7 @@ fn evaluate_unary(function: Unary, x: f64) -> f64 {
     }
 }
 
+/// An operation at one state; `value` gives the values of its operands.
 fn evaluate_op(op: &ProgramOp, value: impl Fn(usize) -> f64) -> f64 {
     let get = |v: &crate::ValueId| value(v.index());
     match op {

@@ -1,8 +1,10 @@
-//! The block evaluator: runs a program over many states inside the process, so that a changed model file can be tried
-//! on a recording at once, without a compiler.
+//! The block evaluator: runs a program over many states in the process, so that a changed model file can be tried on a
+//! recording at once and without a compiler.
 //!
-//! Decision: the Python package uses this evaluator first and a C compiler on request, because any machine has the
-//! evaluator. Irregular states go back to it from compiled code, so that faults have one definition.
+//! A derivation and states go in, arrays of results or the first fault come out.
+//!
+//! Decision: the Python package uses this evaluator by default and a C compiler on request, because every machine can
+//! run the evaluator. Compiled code hands irregular states back to it, so that faults have one definition.
 
 pub(crate) mod lost_digits;
 mod machine;
@@ -20,7 +22,7 @@ use crate::{Derivation, DynamicsPrograms, ModelPrograms, ReactionPrograms};
 
 use machine::{OutputBlock, RegisterMachine, SingleStateProgram};
 
-/// Motion of the active coordinates, one slice of equal length per coordinate, in the order of the model file.
+/// Motion of the active coordinates: one slice per coordinate, in the order of the model file, all of equal length.
 #[derive(Clone, Debug, Default)]
 pub struct MotionStates<'a> {
     /// Coordinates, rad or m.
@@ -29,7 +31,7 @@ pub struct MotionStates<'a> {
     pub qd: Vec<&'a [f64]>,
     /// Accelerations, rad/s^2 or m/s^2.
     pub qdd: Vec<&'a [f64]>,
-    /// Forces that the drives carry, for effects that depend on the load; empty if there are none.
+    /// Forces of the drives, N or N m, for effects that depend on the load; empty if there are none.
     pub load: Vec<&'a [f64]>,
 }
 
@@ -45,25 +47,25 @@ impl MotionStates<'_> {
     }
 }
 
-/// A state at which the model has no answer.
+/// A state at which the model has no solution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PoseFault {
-    /// Which state.
+    /// Index of the state, from 0.
     pub sample: usize,
-    /// Why.
+    /// The reason.
     pub reason: PoseReason,
 }
 
-/// Why a pose has no answer.
+/// Why a pose has no solution.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PoseReason {
-    /// The loops cannot close there.
+    /// The loops cannot close at this pose.
     OutOfReach,
-    /// The passive coordinates or the drives' forces are not determined there.
+    /// The passive coordinates or the forces of the drives are not determined at this pose.
     Singular,
-    /// A term of the model, such as an effect of its own, has no finite value there.
+    /// A term of the model, such as an effect given by an expression, has no finite value at this state.
     Undefined,
-    /// An input is no finite number.
+    /// An input is NaN or infinite.
     NotFinite {
         /// Its name in the model file, with `_d` and `_dd` for rates and accelerations; `p1_min`, ... for base parameters.
         input: String,
@@ -83,6 +85,7 @@ impl From<PoseError> for PoseReason {
     }
 }
 
+/// One line that begins with the index of the state.
 impl fmt::Display for PoseFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.reason {
@@ -108,13 +111,18 @@ impl fmt::Display for PoseFault {
 
 impl std::error::Error for PoseFault {}
 
-/// Numeric values for a model's constants and base parameters, ready to run its programs.
+/// A model with values of its constants and parameters, which runs its programs over states.
 #[derive(Clone, Debug)]
 pub struct ModelEvaluator<'a> {
+    /// The mechanism; its parameters are used where a program reads them.
     mechanism: &'a Mechanism,
+    /// The programs.
     programs: &'a ModelPrograms,
+    /// Indices of the active coordinates.
     active: Vec<usize>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
+    /// Values of the constants, in the order of the file.
     constants: Vec<f64>,
 }
 
@@ -142,13 +150,13 @@ impl<'a> ModelEvaluator<'a> {
         }
     }
 
-    /// The same with the parameters of another mechanism, which has the same entries.
+    /// The same evaluator with the parameters of another mechanism, which must have the same entries.
     pub(crate) fn with_parameters(mut self, mechanism: &'a Mechanism) -> Self {
         self.mechanism = mechanism;
         self
     }
 
-    /// p_min for the mechanism's parameters, as emitted code computes it.
+    /// p_min from the mechanism's parameters, computed as in emitted code.
     pub(crate) fn base_parameters(&self) -> Vec<f64> {
         let program = &self.programs.base_parameters;
         let machine = RegisterMachine::new(program, |atom| self.fixed_value(atom, &[]));
@@ -163,10 +171,11 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_matrix(&self.programs.regressor, states)
     }
 
-    /// H_min block by block, for regressions over many states: `visit` gets how many states a block has (at most 64) and
-    /// one column per drive and base parameter (drives outermost), a number for each state. Nothing is kept between blocks.
+    /// H_min block by block, for regressions over many states. `visit` gets the number of states of a block (at most
+    /// 64) and one column per drive and base parameter (drives outermost), each with one number per state. Nothing is
+    /// stored between blocks.
     ///
-    /// Fails at the first state without an answer, and when `visit` does; what stands before a fault may have been shown.
+    /// Fails at the first state without a solution, and if `visit` fails. Blocks before a fault may have been visited.
     pub fn regressor_blocks<E: From<PoseFault>>(
         &self,
         states: &MotionStates<'_>,
@@ -175,7 +184,7 @@ impl<'a> ModelEvaluator<'a> {
         self.regressor_column_blocks(states, &|_| true, visit)
     }
 
-    /// The same of some columns of H_min: the others are zero, and nothing is computed for them.
+    /// The same for some columns of H_min; the others are zero and are not computed.
     pub fn regressor_column_blocks<E: From<PoseFault>>(
         &self,
         states: &MotionStates<'_>,
@@ -189,7 +198,7 @@ impl<'a> ModelEvaluator<'a> {
         })
     }
 
-    /// H for all products of p_g, laid out like [`Self::regressor`].
+    /// H for all products of p_g, in the layout of [`Self::regressor`].
     pub fn full_regressor(&self, states: &MotionStates<'_>) -> Result<DMatrix<f64>, PoseFault> {
         self.evaluate_matrix(&self.programs.full_regressor, states)
     }
@@ -223,7 +232,7 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_program(&dynamics.mass_matrix, states, base)
     }
 
-    /// Generalised forces that rates alone ask for: one vector per independent coordinate.
+    /// c, generalised forces that depend on the rates: one vector per independent coordinate.
     pub fn coriolis(
         &self,
         dynamics: &DynamicsPrograms,
@@ -233,7 +242,7 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_program(&dynamics.coriolis, states, base)
     }
 
-    /// Generalised forces that weight alone asks for: one vector per independent coordinate.
+    /// g, generalised forces of gravity: one vector per independent coordinate.
     pub fn gravity(
         &self,
         dynamics: &DynamicsPrograms,
@@ -243,7 +252,7 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_program(&dynamics.gravity, states, base)
     }
 
-    /// Generalised forces that effects ask for where nothing accelerates: one vector per independent coordinate.
+    /// e, generalised forces of the effects at zero acceleration: one vector per independent coordinate.
     pub fn effects(
         &self,
         dynamics: &DynamicsPrograms,
@@ -253,7 +262,7 @@ impl<'a> ModelEvaluator<'a> {
         self.evaluate_program(&dynamics.effects, states, base)
     }
 
-    /// `c + g + e`, generalised forces that do not depend on accelerations: one vector per independent coordinate.
+    /// `c + g + e`, generalised forces at zero acceleration: one vector per independent coordinate.
     pub fn bias(
         &self,
         dynamics: &DynamicsPrograms,
@@ -261,13 +270,13 @@ impl<'a> ModelEvaluator<'a> {
         base: &[f64],
     ) -> Result<Vec<Vec<f64>>, PoseFault> {
         let mut found = self.evaluate_program(&dynamics.bias, states, base)?;
-        // The Jacobian of the drives stands behind them.
+        // The Jacobian of the drives follows in the outputs.
         found.truncate(self.active.len());
         Ok(found)
     }
 
-    /// All determined components of the reactions for the parameters of the model file, one vector each, in the order in
-    /// which the places of [`Reactions`] count them.
+    /// All determined components of the reactions for the parameters of the model file: one vector each, in the order
+    /// in which [`ReactionPrograms`] numbers them.
     pub fn reactions(
         &self,
         reactions: &ReactionPrograms,
@@ -290,6 +299,7 @@ impl<'a> ModelEvaluator<'a> {
         let rest = self.evaluate_program(&dynamics.bias, states, base)?;
         let (bias, jacobian) = rest.split_at(n);
         let mut accelerations = vec![Vec::with_capacity(states.len()); n];
+        // Per state: J' f - bias on the right-hand side, then a linear system with the mass matrix.
         for sample in 0..states.len() {
             let fault = |reason| PoseFault { sample, reason };
             for (d, force) in forces.iter().enumerate() {
@@ -318,6 +328,7 @@ impl<'a> ModelEvaluator<'a> {
         Ok(accelerations)
     }
 
+    /// A program with one output per drive and column, as a matrix with one row per state and drive.
     fn evaluate_matrix(
         &self,
         program: &StraightLineProgram,
@@ -330,7 +341,7 @@ impl<'a> ModelEvaluator<'a> {
         let mut matrix = DMatrix::zeros(n_rows, n_columns);
         let entries = matrix.as_mut_slice();
         for (k, values) in columns.iter().enumerate() {
-            // Columns stand one after the other; drives take turns in each.
+            // The matrix is stored column by column, with the drives of a state next to each other.
             let first = (k % n_columns) * n_rows + k / n_columns;
             for (i, value) in values.iter().enumerate() {
                 entries[first + i * n_drives] = *value;
@@ -339,6 +350,7 @@ impl<'a> ModelEvaluator<'a> {
         Ok(matrix)
     }
 
+    /// All outputs of a program at all states: one vector per output.
     fn evaluate_program(
         &self,
         program: &StraightLineProgram,
@@ -355,6 +367,7 @@ impl<'a> ModelEvaluator<'a> {
         Ok(outputs)
     }
 
+    /// Runs a program over the states block by block: checks inputs, solves for passive coordinates, then evaluates.
     fn evaluate_blocks<E: From<PoseFault>>(
         &self,
         program: &StraightLineProgram,
@@ -363,6 +376,7 @@ impl<'a> ModelEvaluator<'a> {
         base: &[f64],
         visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
+        // Number of states before the first known fault, and this fault.
         let (mut n, mut fault) = (
             states.len(),
             self.find_not_finite_input(program, states, base),
@@ -370,6 +384,7 @@ impl<'a> ModelEvaluator<'a> {
         if let Some(fault) = &fault {
             n = fault.sample;
         }
+        // Loops without closed form: passive coordinates of all states come first.
         let mut passive = Vec::new();
         if let PassivePosition::Newton(loops) = &self.programs.passive_position {
             let found = self.solve_passive(loops, states, n);
@@ -379,6 +394,7 @@ impl<'a> ModelEvaluator<'a> {
                 fault = Some(earlier);
             }
         }
+        // Fixed values of the program are computed here, outputs that are not wanted are skipped.
         let machine =
             RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
         let input = |atom| match atom {
@@ -394,12 +410,13 @@ impl<'a> ModelEvaluator<'a> {
             }
             Atom::Shared(_) => unreachable!("only emitted code has a pose apart"),
         };
-        // States before the first fault known so far may still have an earlier one.
+        // A state before the known fault may have an earlier one of its own.
         machine.run(n, input, visit)?;
         fault.map_or(Ok(()), |fault| Err(fault.into()))
     }
 
-    /// The first state with an input that is no finite number; constants and base parameters belong to the first one.
+    /// The first state with an input that is NaN or infinite; constants and base parameters count as inputs of the
+    /// first state.
     fn find_not_finite_input(
         &self,
         program: &StraightLineProgram,
@@ -410,6 +427,7 @@ impl<'a> ModelEvaluator<'a> {
             let reason = PoseReason::NotFinite { input };
             Some(PoseFault { sample, reason })
         };
+        // Without a state there is no fault.
         if states.is_empty() {
             return None;
         }
@@ -420,6 +438,7 @@ impl<'a> ModelEvaluator<'a> {
         if let Some(k) = base.iter().position(|x| !x.is_finite()) {
             return fault(0, format!("p{}_min", k + 1));
         }
+        // Names as in messages: coordinate, `_d` for its rate, `_dd` for its acceleration.
         let name = |k: usize| &self.mechanism.coordinates[self.active[k]].name;
         let motion = [(&states.q, ""), (&states.qd, "_d"), (&states.qdd, "_dd")];
         let mut columns: Vec<(&[f64], String)> = Vec::new();
@@ -427,7 +446,7 @@ impl<'a> ModelEvaluator<'a> {
             let named = values.iter().enumerate();
             columns.extend(named.map(|(k, column)| (*column, format!("{}{suffix}", name(k)))));
         }
-        // A load that nothing depends on is not looked at.
+        // A load that the program does not read is not checked.
         let uses_load = |op: &ProgramOp| matches!(op, ProgramOp::Input(Atom::Load(_)));
         if program.ops.iter().any(uses_load) {
             let drives = states.load.iter().zip(&self.mechanism.drives);
@@ -440,7 +459,7 @@ impl<'a> ModelEvaluator<'a> {
         fault(sample, name)
     }
 
-    /// Where a coordinate's values are.
+    /// The array in which a coordinate's values are.
     fn coordinate_source(&self, coordinate: usize) -> CoordinateSource {
         let position = |list: &[usize]| list.iter().position(|i| *i == coordinate);
         position(&self.active).map_or_else(
@@ -452,13 +471,15 @@ impl<'a> ModelEvaluator<'a> {
         )
     }
 
+    /// Position of an active coordinate. Rates and accelerations of passive ones never occur in programs.
     fn coordinate_position(&self, coordinate: usize) -> usize {
         self.active
             .iter()
             .position(|a| *a == coordinate)
-            .expect("passive rates are put in place")
+            .expect("passive rates are replaced by expressions")
     }
 
+    /// The value of an input that does not depend on the state.
     fn fixed_value(&self, atom: Atom, base: &[f64]) -> f64 {
         match atom {
             Atom::Pi => std::f64::consts::PI,
@@ -469,8 +490,8 @@ impl<'a> ModelEvaluator<'a> {
         }
     }
 
-    /// Passive coordinates of the first `n` states by Newton's method, each started from the state before; where that
-    /// fails, from the nominal pose.
+    /// Passive coordinates of the first `n` states by Newton's method. Each state starts from the one before, or from
+    /// the nominal pose if that fails.
     fn solve_passive(
         &self,
         programs: &LoopPrograms,
@@ -483,6 +504,7 @@ impl<'a> ModelEvaluator<'a> {
             residual: SingleStateProgram::new(machine(&programs.residual)),
             scales: SingleStateProgram::new(machine(&programs.scales)),
         };
+        // The solution at the nominal pose defines the assembly mode.
         let nominal = |list: &[usize]| -> Vec<f64> {
             let coordinates = list.iter().map(|i| &self.mechanism.coordinates[*i]);
             coordinates.map(|c| c.nominal).collect()
@@ -493,9 +515,12 @@ impl<'a> ModelEvaluator<'a> {
             passive: vec![Vec::with_capacity(n); self.passive.len()],
             fault: None,
         };
+        // Active and passive coordinates of the last state.
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
         for sample in 0..n {
+            // The pose of this state.
             let active: Vec<f64> = states.q.iter().map(|q| q[sample]).collect();
+            // From the state before, which is usually close.
             let near = last.and_then(|(at, passive)| follow(&loops, &at, &passive, &active).ok());
             let found = near.map_or_else(
                 || {
@@ -526,7 +551,7 @@ impl<'a> ModelEvaluator<'a> {
     }
 }
 
-/// The first value that is no finite number; many at once are looked at, as nearly all are.
+/// Index of the first value that is NaN or infinite. Values are tested in groups, because nearly all are finite.
 fn first_not_finite(values: &[f64]) -> Option<usize> {
     const AT_ONCE: usize = 64;
     let are_finite = |some: &[f64]| some.iter().fold(true, |all, x| all & x.is_finite());
@@ -535,29 +560,37 @@ fn first_not_finite(values: &[f64]) -> Option<usize> {
     Some(start + further)
 }
 
-/// Where a coordinate's values are: among the active or the passive ones.
+/// Position of a coordinate among the active or the passive ones.
 enum CoordinateSource {
+    /// Position among the active coordinates.
     Active(usize),
+    /// Position among the passive coordinates.
     Passive(usize),
 }
 
 /// Passive coordinates of the states before the first fault.
 struct PassiveTrajectory {
+    /// One vector per passive coordinate.
     passive: Vec<Vec<f64>>,
+    /// The fault, if there is one.
     fault: Option<PoseFault>,
 }
 
-/// The loops of one geometry, one pose at a time.
+/// The loops of one geometry, evaluated one pose at a time.
 struct LoopEvaluator<'a> {
+    /// Constants and indices of coordinates.
     evaluator: &'a ModelEvaluator<'a>,
+    /// Residuals and their Jacobian.
     residual: SingleStateProgram<'a>,
+    /// Scales of residuals and coordinates.
     scales: SingleStateProgram<'a>,
 }
 
 impl LoopEvaluator<'_> {
+    /// The value of a coordinate at a pose.
     fn atom_value(&self, atom: Atom, active: &[f64], passive: &[f64]) -> f64 {
         let Atom::Coordinate(i) = atom else {
-            unreachable!("a loop's residual depends on coordinates alone")
+            unreachable!("a loop's residual depends on coordinates only")
         };
         match self.evaluator.coordinate_source(i) {
             CoordinateSource::Active(k) => active[k],
@@ -572,6 +605,7 @@ impl Loops for LoopEvaluator<'_> {
     type Passive = Vec<f64>;
     type Matrix = Vec<Vec<f64>>;
 
+    // Outputs: residuals, then the Jacobian row by row.
     fn linearise(&self, active: &Vec<f64>, passive: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
         let n = passive.len();
         self.residual.run(

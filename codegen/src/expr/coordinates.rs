@@ -2,7 +2,7 @@
 
 use super::{Atom, ExprId, Graph};
 
-/// Coordinates on which some expressions depend.
+/// Indices of the coordinates on which some expressions depend, in increasing order.
 pub(crate) fn coordinates_of(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     let atoms = graph.atoms(roots);
     atoms

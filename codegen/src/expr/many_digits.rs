@@ -1,4 +1,4 @@
-//! Evaluation with many digits: numbers in which small shares of columns are told from rounding.
+//! Evaluation with many digits: small contributions of columns remain distinguishable from rounding errors.
 
 use std::collections::BTreeMap;
 
@@ -6,16 +6,19 @@ use modelmill_algebra::digits::BigFloat;
 
 use super::{Atom, AtomAngleSum, EvaluationDomain, Rational, Unary};
 
-/// Values of atoms, with cosines and sines of those that were asked for as angles.
+/// Values of atoms, with cosines and sines of those that are used as angles.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BigFloatPoint {
+    /// Value of every atom that was set.
     values: BTreeMap<Atom, BigFloat>,
+    /// Cosine and sine of every atom that was set as an angle.
     circles: BTreeMap<Atom, (BigFloat, BigFloat)>,
 }
 
 impl BigFloatPoint {
-    /// Gives an atom a value; `None` where it is too large to be an angle, if it is one.
+    /// Sets the value of an atom. `None` where it is used as an angle and is too large for a cosine and a sine.
     pub(crate) fn set(&mut self, atom: Atom, value: BigFloat, is_angle: bool) -> Option<()> {
+        // Cosine and sine are computed once, when the value is set.
         if is_angle {
             self.circles.insert(atom, value.cos_sin()?);
         }
@@ -46,6 +49,7 @@ impl EvaluationDomain for BigFloatPoint {
     fn unary(&self, function: Unary, a: &BigFloat) -> Option<BigFloat> {
         match function {
             Unary::Sqrt => a.sqrt(),
+            // The sign of zero is zero.
             Unary::Sign if a.is_zero() => Some(BigFloat::zero()),
             Unary::Sign => Some(BigFloat::integer(if a.is_negative() { -1 } else { 1 })),
             Unary::Abs => Some(a.abs()),
@@ -59,6 +63,7 @@ impl EvaluationDomain for BigFloatPoint {
         self.values.get(&atom).cloned()
     }
     fn cos_sin(&self, angle: &AtomAngleSum) -> Option<(BigFloat, BigFloat)> {
+        // Angles are added one unit at a time by the addition theorems.
         let mut total = (BigFloat::integer(1), BigFloat::zero());
         for (atom, n) in angle.terms() {
             let (c, s) = self.circles.get(atom)?;

@@ -1,4 +1,4 @@
-//! Expressions against exact evaluation: whatever the constructors do to a random expression, its value stays.
+//! Expressions against exact evaluation: the constructors keep the value of every random expression.
 
 use modelmill_algebra::field::{FieldElement, MODULUS};
 
@@ -65,7 +65,7 @@ fn point(seed: [i64; 3], tangents: [i64; 2]) -> RationalPoint {
     point
 }
 
-/// Builds the expressions, and beside them their values by plain rational arithmetic.
+/// Builds the expressions, and computes their values by plain rational arithmetic.
 fn build(graph: &mut Graph, steps: &[Step], point: &RationalPoint) -> (Vec<ExprId>, Vec<Rational>) {
     let mut made: Vec<(ExprId, Rational)> = vec![(Graph::ONE, Rational::ONE)];
     for step in steps {

@@ -1,5 +1,5 @@
-//! Random poses of a mechanism in the prime field: angles as rational points of the circle, loops solved by square roots
-//! in the field.
+//! Random poses of a mechanism in the prime field: angles are rational points of the circle, and loops are solved by
+//! square roots in the field.
 
 use modelmill_algebra::field::{FieldElement, FieldNumber, RandomStream};
 use modelmill_spec::Mechanism;
@@ -10,22 +10,25 @@ use crate::expr::{
     Atom, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary,
 };
 
-/// How often a draw is repeated until all square roots exist.
+/// Largest number of draws until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
 
-/// Draws poses that a plan solves for.
+/// Draws random poses and closes their loops by the steps of a plan.
 pub(crate) struct FieldPoseSampler {
+    /// Index of every coordinate, and whether it is an angle.
     coordinates: Vec<(usize, bool)>,
+    /// Number of constants of the mechanism.
     n_constants: usize,
-    /// Functions of constants that exist only for some of them.
+    /// Functions of constants that do not exist for all constants of the field, such as square roots and quotients.
     of_constants: EvaluationTape,
+    /// The steps that close the loops.
     pub(crate) steps: Vec<FieldSolveStep>,
-    /// Angles whose turns are drawn in so many parts.
+    /// Angles that are drawn in parts, with the number of parts.
     divided: Vec<(usize, i64)>,
 }
 
 impl FieldPoseSampler {
-    /// Makes a plan evaluable at constants for which also `outputs` may exist.
+    /// Makes a plan evaluable, for constants at which `outputs` exist as well.
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -48,7 +51,10 @@ impl FieldPoseSampler {
         }
     }
 
-    /// Random constants whose functions that do not depend on the motion all exist.
+    /// Random constants at which all functions of constants exist.
+    ///
+    /// # Errors
+    /// [`DeriveError::NoPointFound`] after [`MOST_DRAWS`] draws.
     pub(crate) fn draw_constants<const P: u64>(
         &self,
         stream: &mut RandomStream,
@@ -71,8 +77,8 @@ impl FieldPoseSampler {
             .ok_or(DeriveError::NoPointFound { draws: MOST_DRAWS })
     }
 
-    /// Some values for all coordinates, loops still open. They lie in the prime field, over whichever field the loops
-    /// are closed.
+    /// Random values of all coordinates; the loops are still open. The values lie in the prime field, whichever field
+    /// the loops are closed in.
     pub(crate) fn draw_open_point<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
         constants: &FieldPoint<FieldElement<P>>,
@@ -86,6 +92,7 @@ impl FieldPoseSampler {
             }
             point.values.insert(Atom::Coordinate(*i), N::draw(stream));
         }
+        // Divided angles are multiples of an opaque part, so that other angles can be fractions of them.
         for (i, n) in &self.divided {
             if let Some(turn) = divided_angle(&point, *i, *n) {
                 point.angles.insert(Atom::Coordinate(*i), turn);
@@ -94,7 +101,7 @@ impl FieldPoseSampler {
         point
     }
 
-    /// The loops of a point closed; `None` if they do not close for its free coordinates.
+    /// Closes the loops of a point; `None` if they cannot close for its independent coordinates.
     pub(crate) fn close_loops<N: FieldNumber>(
         &self,
         mut point: FieldPoint<N>,
@@ -118,7 +125,9 @@ fn divided_angle<N: FieldNumber>(
         point.unary(Unary::Cos, &part)?,
         point.unary(Unary::Sin, &part)?,
     );
+    // Addition theorem of two angles.
     let turned = |(a, b): (N, N), (c, s): (N, N)| (a * c - b * s, a * s + b * c);
+    // Repeated squaring over the binary digits of n.
     let (mut total, mut left) = ((N::ONE, N::ZERO), n);
     while left > 0 {
         if left % 2 == 1 {
@@ -130,8 +139,9 @@ fn divided_angle<N: FieldNumber>(
     Some(total)
 }
 
-/// Functions under `roots` that depend on constants alone and do not exist for all of them.
+/// Functions in `roots` that depend on constants alone and do not exist for all constants of the field.
 fn partial_constant_functions(graph: &Graph, roots: &[ExprId]) -> EvaluationTape {
+    // Per node whether it depends on anything but constants.
     let mut moves = vec![false; graph.len()];
     let mut found = Vec::new();
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
@@ -147,6 +157,7 @@ fn partial_constant_functions(graph: &Graph, roots: &[ExprId]) -> EvaluationTape
         };
         graph.for_each_child(id, |child| moving |= moves[child.index()]);
         moves[i] = moving;
+        // Square roots and divisions need not exist.
         let partial = match graph.node(id) {
             Node::Unary(function, _) => *function == Unary::Sqrt,
             Node::Product(factors) => factors.iter().any(|(_, n)| *n < 0),

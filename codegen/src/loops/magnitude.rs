@@ -1,5 +1,5 @@
-//! Magnitudes of loop residuals, coordinates and determinants: what Newton's method holds residuals and steps against, and
-//! what singular poses are told by, so that neither depends on the unit of length.
+//! Magnitudes of loop residuals, coordinates and determinants. Newton's method compares residuals and steps with them,
+//! and singular poses are detected by them, so that neither depends on the unit of length.
 //!
 //! Decision: a determinant counts as zero below 1e-9 of the magnitude of its terms (in `f32`: ten roundings). That
 //! magnitude is an expression in the constants alone, computed once per geometry: sine and cosine count as 1,
@@ -17,8 +17,8 @@ use crate::expr::{
     Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node, Unary, nominal_of, nominal_value,
 };
 
-/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops in m.
-/// It is 1 where there is none; what couples angles has no length.
+/// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops, m.
+/// It is 1 if there is no such expression; couplings of angles have no length and are skipped.
 pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots: &[ExprId]) -> f64 {
     let mut known = HashMap::new();
     let mut lengths = roots.to_vec();
@@ -33,23 +33,25 @@ pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots:
         .unwrap_or(1.0)
 }
 
-/// How large a value is at the nominal pose beside what rounding may change it by, in units of the last digit; `None` where
-/// it has no value.
+/// Magnitude of a value at the nominal pose divided by the change that rounding may cause, in units of the last digit;
+/// `None` where it has no value.
 ///
-/// For a sum that is its share of the magnitudes of its terms. A product has lost as many digits as its factors together
-/// have relative to their own sizes: it is as good as its worst factor, however many there are, while the magnitudes of all
-/// its terms, multiplied out, would count the digits of every factor.
+/// For a sum this is its share of the magnitudes of its terms. For a product, the relative errors of its factors add
+/// up: it is as exact as its worst factor, however many there are. The magnitudes of all its terms, multiplied out,
+/// would count the errors of every factor.
 pub(crate) fn significant_digits(
     graph: &Graph,
     mechanism: &Mechanism,
     root: ExprId,
 ) -> Option<f64> {
+    // Values of all nodes, then a bound of the rounding error of each node, operands first.
     let order = operands_first(graph, root);
     let values = EvaluationTape::new(graph, &order)
         .evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
     let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
     for (id, value) in order.iter().zip(values) {
         let of = |id: &ExprId| known[id];
+        // Error bounds in units of the last digit, by first-order propagation.
         let changes = match graph.node(*id) {
             Node::Sin(_)
             | Node::Cos(_)
@@ -77,10 +79,11 @@ pub(crate) fn significant_digits(
     left.is_finite().then_some(left)
 }
 
-/// Everything that an expression is made of, itself last.
+/// All nodes that an expression consists of, operands first, itself last.
 fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
     let mut order = Vec::new();
     let mut seen = HashSet::new();
+    // A node is entered once to visit its operands, and left once they are in the list.
     let mut waiting = vec![(root, false)];
     while let Some((id, is_left)) = waiting.pop() {
         if is_left {
@@ -103,7 +106,7 @@ fn operands_first(graph: &Graph, root: ExprId) -> Vec<ExprId> {
     order
 }
 
-/// Whether an angle itself, not its sine or cosine, is a term of a sum.
+/// Whether an angle itself, not its sine or cosine, is a term of the expression.
 fn has_angle_term(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
     let is_angle = |id: ExprId| {
         matches!(graph.node(id), Node::Atom(Atom::Coordinate(i))
@@ -115,16 +118,17 @@ fn has_angle_term(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> bool {
     }
 }
 
-/// The size of a mechanism's loops: the magnitudes of all lengths in them, without those that move.
+/// The size of a mechanism's loops: the sum of the magnitudes of all constant lengths in them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LoopSize {
-    /// A sum of magnitudes of constants, in m; 0 where there is none.
+    /// A sum of magnitudes of constants, m; zero if there is none.
     pub(crate) total: ExprId,
-    /// Its value for the mechanism's constants.
+    /// Its value for the mechanism's constants, m.
     pub(crate) nominal: f64,
 }
 
 impl LoopSize {
+    /// The size by the residuals of the loops; prismatic coordinates count as zero.
     pub(crate) fn from_residual(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -137,7 +141,7 @@ impl LoopSize {
             .collect();
         let still = nominal_lengths(graph, mechanism, |_, _| Graph::ZERO);
         let mut terms = graph.substitute(&terms, &still);
-        // What couples coordinates has no size of its own.
+        // Couplings have no size of their own.
         terms.retain(|term| graph.atoms(&[*term]).into_iter().all(Atom::is_fixed));
         let total = graph.add_all(&terms);
         let nominal = nominal_value(graph, mechanism, total).filter(|size| size.is_normal());
@@ -150,12 +154,12 @@ impl LoopSize {
         }
     }
 
-    /// How large these loops are beside those of the mechanism's constants; 1 for those.
+    /// The size of these loops divided by that of the mechanism's own constants; 1 for those.
     pub(crate) fn relative_scale(&self, graph: &mut Graph) -> ExprId {
         self.scale_length(graph, 1.0)
     }
 
-    /// A length of the mechanism, longer by as much as the loops are larger.
+    /// A length of the mechanism, m, multiplied by the ratio of the size of these loops to the nominal one.
     fn scale_length(&self, graph: &mut Graph, length: f64) -> ExprId {
         if self.nominal == 0.0 {
             return rounded_number(graph, length);
@@ -164,9 +168,9 @@ impl LoopSize {
         graph.mul(share, self.total)
     }
 
-    /// The sum of the magnitudes of all terms of an expression that depends on the pose: for any lengths, with sines and
-    /// cosines of 1 and slides as far out as at the nominal pose. Fractions have the values of the nominal pose, and grow
-    /// with the loops.
+    /// The sum of the magnitudes of all terms of an expression that depends on the pose. Sines and cosines count as 1,
+    /// and prismatic coordinates as at the nominal pose. Fractions have the values of the nominal pose and are scaled
+    /// with the size of the loops.
     pub(crate) fn term_magnitude(
         &self,
         graph: &mut Graph,
@@ -177,15 +181,17 @@ impl LoopSize {
         let out = nominal_lengths(graph, mechanism, |graph, nominal| {
             self.scale_length(graph, nominal)
         });
+        // Prismatic coordinates are replaced by their nominal values, scaled with the loops.
         let at_any_pose = graph.substitute(&[found], &out)[0];
         let is_known = graph.atoms(&[at_any_pose]).into_iter().all(Atom::is_fixed);
         let is_there = nominal_value(graph, mechanism, at_any_pose).is_some_and(f64::is_normal);
         if is_known && is_there {
             return at_any_pose;
         }
+        // Fractions of the state remain: the nominal value is scaled by a power of the size.
         let nominal = nominal_magnitude(graph, mechanism, &[id]);
         let nominal = rounded_number(graph, nominal);
-        // Its own lengths say how large it is: drives between points have some without a loop.
+        // Its own lengths define its size, since drives between points have lengths without a loop.
         let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
         let is_metre =
             |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
@@ -202,9 +208,10 @@ impl LoopSize {
         }
     }
 
-    /// What a determinant is held against: the sum of the magnitudes of its terms, as [`Size::of_terms`] has it. Where the
-    /// nominal pose itself would all but count as singular by that, since the terms cancel in every factor and at every pose,
-    /// it is what rounding says that counts, which grows with the loops. What is below `singular` of its size counts as zero.
+    /// What a determinant is compared with: the sum of the magnitudes of its terms, as by [`LoopSize::term_magnitude`].
+    /// If the nominal pose itself would nearly count as singular by that, because the terms cancel in every factor and
+    /// at every pose, the rounding error counts instead, scaled with the loops. A value below `singular` of the result
+    /// counts as zero.
     pub(crate) fn determinant_magnitude(
         &self,
         graph: &mut Graph,
@@ -212,7 +219,7 @@ impl LoopSize {
         id: ExprId,
         singular: f64,
     ) -> ExprId {
-        /// Determinants become smaller by this from pose to pose before they are singular.
+        /// The nominal value must exceed the limit by this factor, since determinants vary from pose to pose.
         const ROOM: f64 = 1e3;
         let terms = self.term_magnitude(graph, mechanism, id);
         let at_nominal = |graph: &Graph, id| nominal_value(graph, mechanism, id).map(f64::abs);
@@ -222,6 +229,7 @@ impl LoopSize {
         if value > ROOM * singular * size {
             return terms;
         }
+        // Cancellation at every pose: the share of rounding replaces the share of terms.
         match significant_digits(graph, mechanism, id) {
             Some(left) if left > value / size => {
                 let share = rounded_number(graph, value / left / size);
@@ -231,7 +239,7 @@ impl LoopSize {
         }
     }
 
-    /// The size that some constants make up, if they do.
+    /// The size that is the sum of the magnitudes of some constants; `None` if that is zero or not finite.
     fn from_constants(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -250,14 +258,15 @@ impl LoopSize {
     }
 }
 
-/// The power of the unit of length with which an expression grows, if it does so with one: `lengths` are those of its
-/// constants that are in it, besides the coordinates that slide.
+/// The power of the unit of length with which an expression scales, if it scales with one. `lengths` are its constants
+/// that are lengths; prismatic coordinates are lengths as well.
 fn length_degree(
     graph: &Graph,
     mechanism: &Mechanism,
     id: ExprId,
     lengths: &[Atom],
 ) -> Option<i32> {
+    // Binary logarithm of the magnitude with all lengths multiplied by `unit`.
     let value = |unit: f64| {
         let atom = |atom: Atom| {
             let moves = matches!(atom, Atom::Coordinate(i)
@@ -268,6 +277,7 @@ fn length_degree(
         let values = EvaluationTape::new(graph, &[id]).evaluate(&FloatDomain(atom))?;
         Some(values[0].abs().log2()).filter(|size| size.is_finite())
     };
+    // A power gives equal integer steps for each factor of two.
     let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
     let degree = (two - one).round();
     let is_power = [two - one, four - two]
@@ -277,7 +287,7 @@ fn length_degree(
     (is_power && degree.abs() < 100.0).then_some(degree as i32)
 }
 
-/// What stands for each coordinate that is a length, by its nominal value in m.
+/// Replacements of every prismatic coordinate, by a function of its nominal value in m.
 fn nominal_lengths(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -290,13 +300,13 @@ fn nominal_lengths(
         .collect()
 }
 
-/// A number that is exact to rounding.
+/// A double as an exact rational number; 1 if it is not finite.
 fn rounded_number(graph: &mut Graph, value: f64) -> ExprId {
     let value = BigRational::from_float(value).unwrap_or_else(BigRational::one);
     graph.rational(value.into())
 }
 
-/// An expression with every term taken by its magnitude.
+/// An expression in which every term is replaced by its magnitude; `known` stores results by node.
 pub(crate) fn expression_magnitude(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -311,7 +321,8 @@ pub(crate) fn expression_magnitude(
         Node::Sin(_)
         | Node::Cos(_)
         | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
-        // An angle that stands for itself; its turns are known to Newton's method. Or a component of a unit quaternion.
+        // Angles count as 1, since Newton's method works with their sines and cosines; so do components of unit
+        // quaternions.
         Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => {
             Graph::ONE
         }
@@ -336,6 +347,7 @@ pub(crate) fn expression_magnitude(
         Node::Product(factors) => {
             let factors: Vec<_> = factors
                 .into_iter()
+                // A divisor keeps its own magnitude: a sum of magnitudes would make the quotient too small.
                 .map(|(base, n)| {
                     let base = if n > 0 {
                         expression_magnitude(graph, mechanism, known, base)

@@ -1,5 +1,5 @@
-//! Loops are cut for the recursion and closed again here: which coordinates follow from which, in closed form where that
-//! is known, and poses at which all loops are closed.
+//! Loops are cut for the recursion and closed again here. The mechanism and its tree go in. The closure equations come
+//! out, with passive coordinates in closed form where one is known, and poses at which all loops are closed.
 
 mod all;
 pub(crate) mod branches;

@@ -11,16 +11,19 @@ use nalgebra::{DMatrix, DVector};
 use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::magnitude;
 
-/// Residuals of loops with their derivatives by the coordinates that close them.
+/// Residuals of loops with their derivatives by the coordinates that close them, evaluated in double precision.
 pub(crate) struct NumericLoops<'a> {
+    /// Values of constants and nominal coordinates come from here.
     mechanism: &'a Mechanism,
     /// Coordinates that the loops are solved for.
     unknown: Vec<usize>,
-    /// Coordinates that are moved, with the length in m or the angle in rad that counts as one there.
+    /// Coordinates that are moved, with the value that counts as one for each: 1 rad or the size of the loops in m.
     moved: Vec<(usize, f64)>,
+    /// Number of residuals, which come before the derivatives on the tape.
     n_residuals: usize,
-    /// What one is for each unknown: 1 rad, or the size of the loops in m.
+    /// The value that counts as one for each unknown: 1 rad, or the size of the loops in m.
     scales: Vec<f64>,
+    /// Residuals, then their derivatives by each unknown.
     tape: EvaluationTape,
 }
 
@@ -62,20 +65,21 @@ impl<'a> NumericLoops<'a> {
         }
     }
 
-    /// Coordinates of the nominal pose with the loops closed to rounding.
+    /// Coordinates of the nominal pose with the loops closed up to rounding; `None` if Newton's method fails.
     pub(crate) fn closed_nominal_pose(&self) -> Option<Vec<f64>> {
         let mut q = self.declared_nominal_pose();
         self.close_loops(&mut q)?;
         Some(q)
     }
 
-    /// Coordinates of the nominal pose as the model file has them, loops closed by its reader.
+    /// Coordinates of the nominal pose as stated in the model file, with loops closed by its reader, rad or m.
     pub(crate) fn declared_nominal_pose(&self) -> Vec<f64> {
         let coordinates = self.mechanism.coordinates.iter();
         coordinates.map(|c| c.nominal).collect()
     }
 
-    /// What counts as one for each coordinate: 1 rad, the size of the loops in m, or 1 m where no loop sets a size.
+    /// The value that counts as one for each coordinate: 1 rad, the size of the loops in m, or 1 m where no loop
+    /// defines a size.
     pub(crate) fn coordinate_unit(&self, coordinate: usize) -> f64 {
         let moved = self.moved.iter().copied();
         let unknown = self
@@ -89,9 +93,10 @@ impl<'a> NumericLoops<'a> {
             .unwrap_or(1.0)
     }
 
-    /// A pose whose moved coordinates lie within `reach` (angles in rad, lengths relative to the size of the loops) of
-    /// the nominal one, followed from there; `None` if the loops cannot be followed so far.
+    /// A random pose whose moved coordinates lie within `reach` of the nominal one (rad, or relative to the size of the
+    /// loops), reached in small steps; `None` if the loops cannot be followed so far.
     pub(crate) fn random_pose(&self, reach: f64, stream: &mut RandomStream) -> Option<Vec<f64>> {
+        // Number of small steps, each of which is closed again.
         const STEPS: u32 = 8;
         let mut q = self.declared_nominal_pose();
         let moves: Vec<(usize, f64)> = self
@@ -113,7 +118,7 @@ impl<'a> NumericLoops<'a> {
         Some(q)
     }
 
-    /// Residuals, and their derivatives by the unknown coordinates, one column each.
+    /// Residuals, and their derivatives by the unknown coordinates, one column each; `None` if any value is not finite.
     pub(crate) fn linearise(&self, q: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let value = |atom: Atom| match atom {
             Atom::Constant(i) => self.mechanism.constants[i].value,
@@ -122,7 +127,7 @@ impl<'a> NumericLoops<'a> {
             _ => 0.0,
         };
         let values = self.tape.evaluate(&FloatDomain(value))?;
-        // A singular value decomposition of what are no numbers comes to no end.
+        // A singular value decomposition of values that are not finite does not end.
         if !values.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -133,8 +138,9 @@ impl<'a> NumericLoops<'a> {
         ))
     }
 
-    /// Whether the loops determine the unknown coordinates at a pose.
+    /// Whether the loops determine the unknown coordinates at a pose: full rank of the scaled derivatives.
     pub(crate) fn is_regular(&self, q: &[f64]) -> bool {
+        // Least singular value relative to the largest.
         const SINGULAR: f64 = 1e-9;
         let Some((_, mut jacobian)) = self.linearise(q) else {
             return false;
@@ -146,7 +152,7 @@ impl<'a> NumericLoops<'a> {
         values.len() == self.unknown.len() && values.min() > SINGULAR * values.max()
     }
 
-    /// Closes the loops by moving the unknown coordinates.
+    /// Closes the loops by moving the unknown coordinates with Newton's method; `None` if it does not converge.
     fn close_loops(&self, q: &mut [f64]) -> Option<()> {
         if self.unknown.is_empty() {
             return Some(());
@@ -156,6 +162,7 @@ impl<'a> NumericLoops<'a> {
             for (mut column, one) in jacobian.column_iter_mut().zip(&self.scales) {
                 column *= *one;
             }
+            // Least squares with the smallest step, since equations may depend on each other.
             let svd = jacobian.svd(true, true);
             let smallest = 1e-12 * svd.singular_values.amax();
             let step = svd.solve(&residual, smallest).ok()?;
@@ -170,7 +177,7 @@ impl<'a> NumericLoops<'a> {
     }
 }
 
-/// A number between -1 and 1.
+/// A uniformly distributed number from -1 to 1.
 pub(crate) fn uniform_symmetric(stream: &mut RandomStream) -> f64 {
     2.0 * (stream.next_bits() as f64 / u64::MAX as f64) - 1.0
 }

@@ -1,4 +1,5 @@
-//! The order in which loops are solved, each as a dyad, by relations or as a coupling, and the same made evaluable in the field.
+//! The order in which loops are solved, each as a dyad, by relations or as a coupling. The loops of a mechanism go in,
+//! and a list of steps comes out that can be emitted or evaluated in the prime field.
 //!
 //! Decision: the order is found by peeling, without search: from the front for given drive coordinates, from the
 //! back for points drawn at random. Both find an order if there is one, because a solved loop never blocks another.
@@ -19,18 +20,21 @@ use crate::loops::spatial;
 /// Which coordinates a plan may solve for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum SolvableCoordinates {
-    /// The passive ones, with the active ones given: what a controller needs.
+    /// The passive ones, with the active ones given: this is what a controller needs.
     Passive,
-    /// Any, with the others drawn at random: what sampling needs.
+    /// Any, with the others drawn at random: this is what sampling in the field needs.
     Any,
 }
 
-/// Looks for a plan. Every loop takes the root that it has at the nominal pose: loops that are alike but for their
-/// assembly mode must differ in the field, too.
+/// Looks for a plan. Every loop takes the root that it has at the nominal pose: loops that differ only in their
+/// assembly mode must differ in the field as well.
 ///
-/// Given coordinates only become more from loop to loop, so for [`Unknowns::Passive`] any loop that can be solved may be
-/// solved next. With [`Unknowns::Any`] a loop's unknowns must not be needed by the loops before it, so the plan is made
-/// from its end: any loop with two unknowns of its own among those left may be the last of them.
+/// With [`SolvableCoordinates::Passive`] the set of given coordinates only grows from loop to loop, so any loop that
+/// can be solved may be solved next. With [`SolvableCoordinates::Any`] the unknowns of a loop must not be needed by the
+/// loops before it. The plan is then made from its end: any remaining loop with two unknowns of its own may be the last
+/// one.
+///
+/// `None` if no order is found.
 pub(crate) fn plan(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -38,11 +42,14 @@ pub(crate) fn plan(
     unknowns: SolvableCoordinates,
 ) -> Option<LoopPlan> {
     let mut steps: Vec<PlanStep> = Vec::new();
+    // Loops without an independent equation are closed by the others.
     let mut todo: Vec<usize> = (0..loops.closures.len())
         .filter(|i| loops.closures[*i].n_independent > 0)
         .collect();
+    // Coordinates that are given, or determined by the steps so far.
     let mut known: BTreeSet<usize> = loops.active.iter().copied().collect();
     while !todo.is_empty() {
+        // The first loop, with the first set of its coordinates, that can be solved now.
         let next = todo.iter().enumerate().find_map(|(position, index)| {
             let closure = &loops.closures[*index];
             let free: Vec<usize> = closure
@@ -61,6 +68,7 @@ pub(crate) fn plan(
                 .find_map(|unknown| solve_loop(graph, mechanism, closure, unknown, unknowns))
                 .map(|found| (position, found))
         });
+        // No loop can be solved alone: the remaining ones may be solvable together.
         let Some((position, mut found)) = next else {
             let mut found = solve_jointly(graph, mechanism, loops, unknowns, &todo, &known)?;
             if unknowns == SolvableCoordinates::Any {
@@ -76,6 +84,7 @@ pub(crate) fn plan(
         }
         steps.extend(found);
     }
+    // Steps were found from the last to the first.
     if unknowns == SolvableCoordinates::Any {
         steps.reverse();
     }
@@ -86,11 +95,11 @@ pub(crate) fn plan(
     Some(LoopPlan { steps, divided })
 }
 
-/// Of more sets than this of a loop's coordinates not all are tried: each attempt derives expressions.
+/// If a loop has more sets of coordinates than this, not all are tried, because each attempt derives expressions.
 const MOST_SETS: usize = 1000;
 
-/// Sets of coordinates for which a loop may be solved; passive ones first. Of very many only those that look solvable, in
-/// their own order.
+/// Sets of coordinates for which a loop may be solved; sets of passive coordinates come first. If there are very many,
+/// only those that look solvable, in their own order.
 fn coordinate_choices(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -99,6 +108,7 @@ fn coordinate_choices(
     loops: &KinematicLoops,
     unknowns: SolvableCoordinates,
 ) -> Vec<Vec<usize>> {
+    // A loop with relations determines exactly the coordinates of its relations.
     let related = closure.explicit_coordinates();
     if !related.is_empty() {
         let all = match unknowns {
@@ -107,11 +117,13 @@ fn coordinate_choices(
         };
         return if all { vec![related] } else { Vec::new() };
     }
+    // A planar loop has two equations.
     let size = if closure.chain.is_some() {
         2
     } else {
         closure.n_independent
     };
+    // The unknowns are fixed by the active coordinates: either their number fits or it does not.
     if unknowns == SolvableCoordinates::Passive {
         return if free.len() == size {
             vec![free.to_vec()]
@@ -119,6 +131,7 @@ fn coordinate_choices(
             Vec::new()
         };
     }
+    // A choice by the structure of the equations, without deriving each set.
     if closure.chain.is_none() && n_subsets(free.len(), size) > MOST_SETS {
         return choose::promising_sets(
             graph,
@@ -134,7 +147,7 @@ fn coordinate_choices(
     sets
 }
 
-/// Solves several loops together.
+/// Solves all remaining loops together, one coordinate after the other; `None` if that fails or is not possible.
 fn solve_jointly(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -144,6 +157,7 @@ fn solve_jointly(
     known: &BTreeSet<usize>,
 ) -> Option<Vec<PlanStep>> {
     let closures: Vec<&LoopClosure> = todo.iter().map(|i| &loops.closures[*i]).collect();
+    // Loops that are solved directly, and loops without equations of their own, cannot be part of a joint system.
     if closures
         .iter()
         .any(|c| c.equations.is_empty() || !c.explicit_coordinates().is_empty())
@@ -159,6 +173,7 @@ fn solve_jointly(
         .flat_map(|c| c.coordinates.clone())
         .collect();
     let size = closures.iter().map(|c| c.n_independent).sum();
+    // Sets of unknowns, as many as the loops have independent equations.
     let sets = match unknowns {
         SolvableCoordinates::Passive => {
             free.retain(|c| !known.contains(c));
@@ -180,7 +195,7 @@ fn solve_jointly(
     })
 }
 
-/// Coordinates solved for one by one as steps of a plan.
+/// One step of a plan for every coordinate that was solved for.
 fn single_steps(steps: Vec<(usize, ClosureSolution)>) -> Vec<PlanStep> {
     let step = |(coordinate, solved)| PlanStep {
         unknown: vec![coordinate],
@@ -189,14 +204,14 @@ fn single_steps(steps: Vec<(usize, ClosureSolution)>) -> Vec<PlanStep> {
     steps.into_iter().map(step).collect()
 }
 
-/// How many subsets of some size there are, or a number beyond all use.
+/// Number of subsets of some size; saturates where it overflows.
 fn n_subsets(of: usize, size: usize) -> usize {
     (0..size).fold(1_usize, |n, i| {
         n.saturating_mul(of.saturating_sub(i)) / (i + 1)
     })
 }
 
-/// All subsets of some size, in order.
+/// All subsets of some size, in lexicographic order of the positions.
 fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
     if size == 0 {
         return vec![Vec::new()];
@@ -211,6 +226,7 @@ fn subsets(of: &[usize], size: usize) -> Vec<Vec<usize>> {
     (0..of.len()).flat_map(with).collect()
 }
 
+/// The steps that solve one loop for `unknown`; `None` if no closed form applies.
 fn solve_loop(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -218,6 +234,7 @@ fn solve_loop(
     unknown: Vec<usize>,
     unknowns: SolvableCoordinates,
 ) -> Option<Vec<PlanStep>> {
+    // A coupling without a relation is its own solution.
     if let Some(follower) = &closure.follower
         && closure.relations.is_empty()
     {
@@ -236,6 +253,7 @@ fn solve_loop(
         };
         return Some(vec![PlanStep { unknown, solved }]);
     }
+    // A spatial loop is solved one coordinate after the other.
     if closure.chain.is_none() && closure.relations.is_empty() {
         let steps = spatial::solve(
             graph,
@@ -246,6 +264,7 @@ fn solve_loop(
         )?;
         return Some(single_steps(steps));
     }
+    // A planar loop: the root is first taken as positive, and again as negative if the nominal pose has that sign.
     let mut solved = planar::solve(graph, closure, &unknown, true)?;
     let follower = closure.follower.as_ref();
     solved
@@ -260,7 +279,7 @@ fn solve_loop(
             solved = planar::solve(graph, closure, &unknown, false)?;
         }
     }
-    // A root that is none can neither fail to exist nor choose between what hangs together.
+    // A root that is a polynomial always exists, and its two signs are motions that are not connected: it is no choice.
     solved.root = solved.root.filter(|root| root.exact.is_none());
     Some(vec![PlanStep { unknown, solved }])
 }

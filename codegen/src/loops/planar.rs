@@ -10,10 +10,13 @@ use crate::loops::closure::{LoopClosure, PlanarLeg};
 use crate::loops::solved::{ClosureSolution, SignedRoot, rotate_vector};
 use crate::loops::whole_root;
 
-/// The vectors that turn with one set of unknown angles, as one vector in a frame turned by `angle`.
+/// The vectors that rotate with the same unknown angles, as one vector in a frame rotated by `angle`.
 struct LegGroup {
+    /// Unknown coordinates in the angle, with their integer factors.
     unknown: BTreeSet<(usize, i32)>,
+    /// The angle of the first of these vectors, with its known part.
     angle: AtomAngleSum,
+    /// Sum of the vectors in that frame, m.
     vector: [ExprId; 2],
 }
 
@@ -35,9 +38,11 @@ pub(crate) fn solve(
             root: None,
         });
     }
+    // Vectors without unknown angles add up to one known vector; the others are grouped by their unknown angles.
     let legs = closure.chain.as_ref()?;
     let mut known = [Graph::ZERO; 2];
     let mut groups: Vec<LegGroup> = Vec::new();
+    // Unknown coordinates that change the length of a vector, as prismatic joints do.
     let slides: Vec<usize> = unknown
         .iter()
         .copied()
@@ -56,11 +61,13 @@ pub(crate) fn solve(
                 _ => None,
             })
             .collect();
+        // A vector without unknown angles belongs to the known one.
         if inside.is_empty() {
             let v = rotate_leg(graph, leg, &AtomAngleSum::NONE);
             known = [graph.add(known[0], v[0]), graph.add(known[1], v[1])];
             continue;
         }
+        // A vector with the unknown angles of an earlier one is written in the frame of that group.
         match groups.iter_mut().find(|g| g.unknown == inside) {
             Some(group) => {
                 let v = rotate_leg(graph, leg, &group.angle);
@@ -86,6 +93,7 @@ pub(crate) fn solve(
             }
         }
     }
+    // Two unknown directions, one direction and one length, or two lengths.
     match (groups.as_slice(), slides.as_slice()) {
         ([first, second], []) => intersect_circles(graph, known, first, second, positive),
         ([group], [slide]) => intersect_circle_and_line(graph, known, group, *slide, positive),
@@ -95,12 +103,13 @@ pub(crate) fn solve(
     .filter(|solved| has_determined_unknowns(solved, unknown))
 }
 
-/// Whether the solved angles determine every unknown coordinate (their integer matrix is unimodular and triangular).
+/// Whether the solved angles determine every unknown coordinate, one at a time and with factors of 1 or -1.
 fn has_determined_unknowns(solved: &ClosureSolution, unknown: &[usize]) -> bool {
     let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
     for (slide, _) in &solved.values {
         left.remove(slide);
     }
+    // Each sum with a single remaining unknown determines that one.
     loop {
         let found = solved.angles.iter().find_map(|(angle, _)| {
             let inside: Vec<_> = angle
@@ -120,34 +129,38 @@ fn has_determined_unknowns(solved: &ClosureSolution, unknown: &[usize]) -> bool 
     }
 }
 
+/// Whether any of the expressions depends on a coordinate.
 fn has_coordinate(graph: &Graph, roots: &[ExprId], coordinate: usize) -> bool {
     graph.atoms(roots).contains(&Atom::Coordinate(coordinate))
 }
 
-/// The leg's vector in a frame turned by `reference`.
+/// The leg's vector in a frame rotated by `reference`.
 fn rotate_leg(graph: &mut Graph, leg: &PlanarLeg, reference: &AtomAngleSum) -> [ExprId; 2] {
     let rest = leg.angle.plus(reference, -1);
     let (c, s) = graph.cos_sin(&rest, leg.pi12);
     rotate_vector(graph, [c, s], leg.vector)
 }
 
+/// Scalar product of two vectors in the plane.
 fn dot(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
     let (x, y) = (graph.mul(a[0], b[0]), graph.mul(a[1], b[1]));
     graph.add(x, y)
 }
 
+/// The component of the vector product along the normal of the plane.
 fn cross(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
     let (x, y) = (graph.mul(a[0], b[1]), graph.mul(a[1], b[0]));
     graph.sub(x, y)
 }
 
-/// Cosine and sine of the angle that turns `arm` into `v`; both have the same length.
+/// Cosine and sine of the angle that rotates `arm` onto `v`; both have the same length, whose square is `arm_squared`.
 fn rotation_between(
     graph: &mut Graph,
     v: [ExprId; 2],
     arm: [ExprId; 2],
     arm_squared: ExprId,
 ) -> [ExprId; 2] {
+    // An arm along the x axis needs only its length.
     if arm[1] == Graph::ZERO {
         return v.map(|x| graph.div(x, arm[0]));
     }
@@ -156,15 +169,20 @@ fn rotation_between(
     [graph.mul(along, inverse), graph.mul(across, inverse)]
 }
 
+/// The root, negated unless `positive`.
 fn apply_sign(graph: &mut Graph, root: ExprId, positive: bool) -> ExprId {
     if positive { root } else { graph.neg(root) }
 }
 
+/// The square root as a node of the graph.
 fn square_root(graph: &mut Graph, radicand: ExprId) -> ExprId {
     graph.unary(crate::expr::Unary::Sqrt, radicand)
 }
 
-/// `known + v1 + v2 = 0`, both of known length: `v1 = alpha d + beta d'`, with `d = -known` and `d'` normal to it.
+/// `known + v1 + v2 = 0`, where both vectors have known lengths: `v1 = alpha d + beta d'`, with `d = -known` and `d'`
+/// normal to it.
+///
+/// `None` where one of the three lengths is exactly zero.
 fn intersect_circles(
     graph: &mut Graph,
     known: [ExprId; 2],
@@ -174,6 +192,7 @@ fn intersect_circles(
 ) -> Option<ClosureSolution> {
     let d = known.map(|x| graph.neg(x));
     let [dd, aa, bb] = [d, first.vector, second.vector].map(|v| dot(graph, v, v));
+    // A vector of length zero has no direction.
     if [dd, aa, bb].contains(&Graph::ZERO) {
         return None;
     }
@@ -191,6 +210,7 @@ fn intersect_circles(
     let (four, square_of_sum) = (graph.mul(aa, dd), graph.mul(sum, sum));
     let four = graph.scale(four, &Rational::integer(4));
     let area = graph.sub(four, square_of_sum);
+    // The root without a root sign, if the area is the square of a polynomial.
     let whole = whole_root::exact_root(graph, area).map(|root| {
         let root = graph.mul(root, inverse);
         graph.scale(root, &Rational::new(1, 2))
@@ -202,7 +222,9 @@ fn intersect_circles(
         let (x, y) = (graph.mul(alpha, d[i]), graph.mul(beta, normal[i]));
         graph.add(x, y)
     });
+    // The second vector closes the triangle.
     let v2: [ExprId; 2] = std::array::from_fn(|i| graph.sub(d[i], v1[i]));
+    // The same root from the coordinates themselves, which shows its sign at a pose: beta = (d x v1)/d^2.
     let (c, s) = graph.cos_sin(&first.angle, 0);
     let actual = rotate_vector(graph, [c, s], first.vector);
     let across = cross(graph, d, actual);
@@ -228,7 +250,7 @@ fn intersect_circles(
     })
 }
 
-/// `known(s) + R(angle) arm(s) = 0` with one of the two independent of the sliding coordinate or both linear in it.
+/// `known(s) + R(angle) arm(s) = 0`, where both vectors are at most linear in the prismatic coordinate `s`.
 fn intersect_circle_and_line(
     graph: &mut Graph,
     known: [ExprId; 2],
@@ -236,6 +258,7 @@ fn intersect_circle_and_line(
     slide: usize,
     positive: bool,
 ) -> Option<ClosureSolution> {
+    // Both vectors as constant part plus s times a factor.
     let (k0, k1) = split_linear(graph, known, slide)?;
     let (a0, a1) = split_linear(graph, group.vector, slide)?;
     // |k0 + s k1|^2 = |a0 + s a1|^2, that is p s^2 + 2 q s + r = 0
@@ -250,7 +273,7 @@ fn intersect_circle_and_line(
     );
     let at = graph.atom(Atom::Coordinate(slide));
     let (value, root) = if p == Graph::ZERO {
-        // Equal directions of sliding: the equation is linear.
+        // Both change with s at the same rate: the equation is linear.
         if q == Graph::ZERO {
             return None;
         }
@@ -270,7 +293,9 @@ fn intersect_circle_and_line(
         let root = whole.unwrap_or_else(|| square_root(graph, radicand));
         let root = apply_sign(graph, root, positive);
         let root_of_length = graph.mul(root, one);
+        // s = (root - q)/p
         let numerator = graph.sub(root_of_length, q);
+        // The same root from the coordinate itself: p s + q.
         let linear = graph.mul(p, at);
         let sum = graph.add(linear, q);
         let witness = graph.div(sum, one);
@@ -281,6 +306,7 @@ fn intersect_circle_and_line(
         };
         (graph.div(numerator, p), Some(root))
     };
+    // With s known, the arm and its target are known, and the angle is the one between them.
     let put = |graph: &mut Graph, v0: [ExprId; 2], v1: [ExprId; 2]| -> [ExprId; 2] {
         std::array::from_fn(|i| {
             let moved = graph.mul(value, v1[i]);
@@ -302,7 +328,7 @@ fn intersect_circle_and_line(
     })
 }
 
-/// `k0 + s a + t b = 0`
+/// `k0 + s a + t b = 0` for two prismatic coordinates `s` and `t` with directions `a` and `b`, by Cramer's rule.
 fn intersect_lines(
     graph: &mut Graph,
     known: [ExprId; 2],
@@ -325,7 +351,8 @@ fn intersect_lines(
     })
 }
 
-/// Splits a vector into what does not depend on a coordinate and its factor; `None` if it is not linear in it.
+/// Splits a vector into the part that does not depend on a coordinate and the factor of the coordinate; `None` if the
+/// vector is not linear in it.
 fn split_linear(
     graph: &mut Graph,
     v: [ExprId; 2],

@@ -1,9 +1,11 @@
-//! Closed form of a loop in space: equations of the loop that hold one unknown coordinate, one after the other.
+//! Closed form of a loop in space: equations of the loop that contain one unknown coordinate are solved one after the
+//! other.
 //!
 //! Seen from a joint, the closing vector's component along its axis and the distance of the closing point from its
 //! origin do not depend on its own angle. Written for every joint of a loop, such equations solve the chains of a
 //! universal joint and a slide, of three revolute axes two of which meet or are parallel, and others (Pieper 1968,
-//! Raghavan and Roth 1993, for the first axes of an arm). The same expressions serve the emitted code and exact sampling.
+//! Raghavan and Roth 1993, for the first axes of an arm). The same expressions serve the emitted code and exact
+//! sampling.
 //!
 //! Decision: an equation with a single unknown is solved next, whichever it is. Two equations that are linear in
 //! its cosine and sine need no root; prismatic coordinates that occur linearly are eliminated across loops; the
@@ -28,17 +30,20 @@ use crate::loops::stretch::{
 use crate::loops::whole_root;
 use crate::tree::KinematicTree;
 
-/// A determinant this much smaller than the magnitudes of its terms cannot be divided by at the nominal pose.
+/// An expression below this share of the magnitudes of its terms counts as zero at the nominal pose, and is no divisor.
 const SINGULAR: f64 = 1e-9;
 
-/// Equations that hold where the loop closes: its vector in every frame along it, and the squares of distances about
+/// Equations that are true where the loop closes: its vector in every frame along it, and the squares of distances from
 /// every origin along it.
+///
+/// The equations are sorted by id and have no duplicates.
 pub(crate) fn equations(
     graph: &mut Graph,
     tree: &KinematicTree,
     between: &PointPairPath,
 ) -> Vec<ExprId> {
     let mut found = BTreeSet::new();
+    // Components of the closing vector in a frame along the loop.
     let mut in_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
         let path = between.segments(graph, tree, &inverse_rotations(turns));
         found.extend(sum_segments(graph, &path));
@@ -54,6 +59,7 @@ pub(crate) fn equations(
             }
         }
     }
+    // From the origin of each joint, the squared distance to the closing point is the same along both paths.
     for side in 0..2 {
         let (path, at) = (between.paths[side], &between.at[side]);
         let other = path_segments(tree, between.paths[1 - side], &[], &between.at[1 - side]);
@@ -61,6 +67,7 @@ pub(crate) fn equations(
             let child = path_segments(tree, &path[k + 1..], &[], at);
             let mut rest: Vec<PathSegment> =
                 path_segments(tree, &path[..=k], &[], &[Graph::ZERO; 3]);
+            // The path from the joint's origin back to the root, and on to the point along the other side.
             for stretch in &mut rest {
                 stretch.vector = stretch.vector.map(|x| graph.neg(x));
             }
@@ -73,11 +80,12 @@ pub(crate) fn equations(
     found.into_iter().collect()
 }
 
-/// The square of the length of a path, as a sum over pairs, in which no joint's cosine or sine is squared.
+/// The square of the length of a path, as a sum over pairs of vectors, in which no joint's cosine or sine is squared.
 fn squared_length(graph: &mut Graph, path: &[PathSegment]) -> ExprId {
     let mut terms = Vec::new();
     for (i, first) in path.iter().enumerate() {
         terms.push((graph.dot(&first.vector, &first.vector), Rational::ONE));
+        // Twice the scalar product with every later vector, in the frame of the first one.
         for second in &path[i + 1..] {
             let mut turns = inverse_rotations(&first.turns);
             for turn in &second.turns {
@@ -96,9 +104,9 @@ fn squared_length(graph: &mut Graph, path: &[PathSegment]) -> ExprId {
 
 /// Solves one or more loops for all of `unknown`, one coordinate after the other; every other coordinate is known.
 ///
-/// Where no equation holds a single unknown, a slide that stands in one linearly, with a known factor, is eliminated and
-/// follows at the end. Square roots have the sign that they have at the nominal pose. Returns `None` where no order is
-/// found, or where what is found does not close the loops.
+/// Where no equation has a single unknown, a prismatic coordinate that is linear in one, with a known factor, is
+/// eliminated and determined at the end. Square roots have the sign that they have at the nominal pose. Returns `None`
+/// where no order is found, or where the solution does not close the loops.
 pub(crate) fn solve(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -106,13 +114,17 @@ pub(crate) fn solve(
     residual: &[ExprId],
     unknown: &[usize],
 ) -> Option<Vec<(usize, ClosureSolution)>> {
+    // Unknowns that are not determined yet.
     let mut left: BTreeSet<usize> = unknown.iter().copied().collect();
+    // Steps in order, and eliminated coordinates, which are evaluated last.
     let (mut steps, mut last) = (Vec::new(), Vec::new());
+    // Equations with the unknowns that they contain.
     let mut open: Vec<(ExprId, BTreeSet<usize>)> = equations
         .iter()
         .map(|e| (*e, equation_unknowns(graph, *e, &left)))
         .collect();
     while !left.is_empty() {
+        // All ways to solve an equation that has one remaining unknown.
         let mut ways: Vec<CandidateSolution> = Vec::new();
         for &coordinate in &left {
             let own: Vec<ExprId> = open
@@ -122,6 +134,7 @@ pub(crate) fn solve(
                 .collect();
             ways.extend(candidate_solutions(graph, mechanism, coordinate, &own));
         }
+        // Solutions without a root come first, then those with the fewest nodes.
         let best = ways
             .into_iter()
             .min_by_key(|way| (way.solved.root.is_some(), way.size, way.coordinate));
@@ -130,6 +143,7 @@ pub(crate) fn solve(
             steps.push((best.coordinate, best.solved));
             continue;
         }
+        // No equation has a single unknown: one prismatic coordinate is eliminated from all of them.
         let (coordinate, value) = find_eliminable_slide(graph, mechanism, &open, &left)?;
         left.remove(&coordinate);
         let all: Vec<ExprId> = open.iter().map(|(e, _)| *e).collect();
@@ -151,12 +165,13 @@ pub(crate) fn solve(
     is_loop_closed(graph, residual, &steps).then_some(steps)
 }
 
+/// Unknown coordinates that an equation contains.
 fn equation_unknowns(graph: &Graph, equation: ExprId, left: &BTreeSet<usize>) -> BTreeSet<usize> {
     let all = crate::expr::coordinates_of(graph, &[equation]);
     all.into_iter().filter(|c| left.contains(c)).collect()
 }
 
-/// A slide that stands linearly, with a known factor, in the equation with the fewest unknowns, and what it equals.
+/// A prismatic coordinate that is linear, with a known factor, in the equation with the fewest unknowns, and its value.
 fn find_eliminable_slide(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -170,6 +185,7 @@ fn find_eliminable_slide(
         let slides: Vec<usize> = inside
             .filter(|c| mechanism.coordinates[*c].motion.is_length())
             .collect();
+        // The factor must be known and must not vanish at the nominal pose.
         slides.into_iter().find_map(|slide| {
             let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];
             if !equation_unknowns(graph, slope, left).is_empty()
@@ -186,12 +202,15 @@ fn find_eliminable_slide(
 
 /// One way to solve for a coordinate.
 struct CandidateSolution {
+    /// Index of the coordinate.
     coordinate: usize,
+    /// Its expressions.
     solved: ClosureSolution,
-    /// Nodes of what it evaluates.
+    /// Number of nodes that it evaluates.
     size: usize,
 }
 
+/// All solutions for a coordinate from `own`, the equations in which it is the only unknown.
 fn candidate_solutions(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -199,6 +218,7 @@ fn candidate_solutions(
     own: &[ExprId],
 ) -> Vec<CandidateSolution> {
     let solved: Vec<ClosureSolution> = if mechanism.coordinates[coordinate].motion.is_angle() {
+        // Each equation alone gives a root; each pair of equations gives cosine and sine without a root.
         let linear: Vec<TrigonometricEquation> = own
             .iter()
             .filter_map(|e| TrigonometricEquation::from_equation(graph, *e, coordinate))
@@ -237,15 +257,19 @@ fn candidate_solutions(
 
 /// `cosine cos q + sine sin q + rest = 0`, with factors that do not depend on `q`.
 struct TrigonometricEquation {
+    /// Factor of the cosine.
     cosine: ExprId,
+    /// Factor of the sine.
     sine: ExprId,
+    /// The part without the angle.
     rest: ExprId,
 }
 
 impl TrigonometricEquation {
-    /// Writes an equation in this form, if it has it: shown in the field.
+    /// Writes an equation in this form, if it has it; tested in the field.
     fn from_equation(graph: &mut Graph, equation: ExprId, coordinate: usize) -> Option<Self> {
         let atom = Atom::Coordinate(coordinate);
+        // At q = 0 the first derivative is the factor of the sine, and the second is the negative factor of the cosine.
         let slope = graph.differentiate(&[equation], atom);
         let bend = graph.differentiate(&slope, atom);
         let [at_zero, slope, bend] =
@@ -258,6 +282,7 @@ impl TrigonometricEquation {
         let (c, s) = graph.cos_sin(&AtomAngleSum::new([(atom, 1)]), 0);
         let (x, y) = (graph.mul(cosine, c), graph.mul(slope, s));
         let form = graph.add_all(&[x, y, rest]);
+        // The form is correct if it differs from the equation by zero.
         let gap = graph.sub(equation, form);
         let is_it = is_zero(graph, gap) && !is_zero(graph, cosine) | !is_zero(graph, slope);
         let simplified = |graph: &Graph, x: ExprId| if is_zero(graph, x) { Graph::ZERO } else { x };
@@ -268,7 +293,7 @@ impl TrigonometricEquation {
         })
     }
 
-    /// One equation: with `r = cosine sin q - sine cos q`, `r^2 = cosine^2 + sine^2 - rest^2`.
+    /// Solves one equation: with `r = cosine sin q - sine cos q`, `r^2 = cosine^2 + sine^2 - rest^2`.
     fn solve(
         &self,
         graph: &mut Graph,
@@ -309,6 +334,7 @@ impl TrigonometricEquation {
     }
 }
 
+/// The solution of an angle by its cosine and sine.
 fn angle_solution(coordinate: usize, cos_sin: [ExprId; 2]) -> ClosureSolution {
     ClosureSolution {
         angles: vec![(
@@ -321,6 +347,7 @@ fn angle_solution(coordinate: usize, cos_sin: [ExprId; 2]) -> ClosureSolution {
     }
 }
 
+/// The solution of a prismatic coordinate by its value.
 fn length_solution(coordinate: usize, value: ExprId) -> ClosureSolution {
     ClosureSolution {
         angles: Vec::new(),
@@ -330,7 +357,7 @@ fn length_solution(coordinate: usize, value: ExprId) -> ClosureSolution {
     }
 }
 
-/// Two equations give cosine and sine without a root.
+/// Solves two equations for cosine and sine without a root, by Cramer's rule; `None` if their determinant vanishes.
 fn solve_equation_pair(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -352,7 +379,7 @@ fn solve_equation_pair(
     Some(angle_solution(coordinate, angle))
 }
 
-/// `p s^2 + 2 q s + r = 0` for the length of a slide.
+/// Solves `p s^2 + 2 q s + r = 0` for a prismatic coordinate; `None` if the equation has another form.
 fn solve_prismatic(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -361,6 +388,7 @@ fn solve_prismatic(
 ) -> Option<ClosureSolution> {
     let atom = Atom::Coordinate(coordinate);
     let slope = graph.differentiate(&[equation], atom);
+    // A quadratic equation has a constant second derivative.
     let bend = graph.differentiate(&slope, atom)[0];
     if graph.atoms(&[bend]).contains(&atom) {
         return None;
@@ -371,6 +399,7 @@ fn solve_prismatic(
     let half = Rational::new(1, 2);
     let (p, q) = (graph.scale(bend, &half), graph.scale(slope, &half));
     let length = |value| length_solution(coordinate, value);
+    // A linear equation: s = -r/(2 q).
     if is_zero(graph, p) {
         if !is_regular(graph, mechanism, slope) {
             return None;
@@ -394,7 +423,8 @@ fn solve_prismatic(
     })
 }
 
-/// The root with the sign of its witness at the nominal pose; `None` if it vanishes there.
+/// The root with the sign of its witness at the nominal pose, with the choice of branch if there is one; `None` if it
+/// vanishes there.
 ///
 /// Where the radicand is the square of a polynomial, that polynomial is the root and there is no other branch.
 fn signed_root(
@@ -408,6 +438,7 @@ fn signed_root(
     }
     let whole = whole_root::exact_root(graph, radicand);
     let root = whole.unwrap_or_else(|| graph.unary(Unary::Sqrt, radicand));
+    // The polynomial may have the opposite sign of the witness.
     let mut sign = nominal_value(graph, mechanism, witness)?;
     if let Some(whole) = whole {
         sign *= nominal_value(graph, mechanism, whole)?;
@@ -421,7 +452,7 @@ fn signed_root(
     Some((signed, whole.is_none().then_some(branch)))
 }
 
-/// Whether an expression can be divided by at the nominal pose.
+/// Whether an expression may be a divisor: it is not zero, and not nearly zero at the nominal pose.
 fn is_regular(graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> bool {
     if is_zero(graph, id) {
         return false;
@@ -430,7 +461,7 @@ fn is_regular(graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> bool {
     nominal_value(graph, mechanism, id).is_some_and(|value| value.abs() > limit)
 }
 
-/// Whether an expression is zero for free atoms: shown at a few points of the field.
+/// Whether an expression is zero for independent atoms, tested at a few points of the field.
 fn is_zero(graph: &Graph, id: ExprId) -> bool {
     if id == Graph::ZERO {
         return true;
@@ -444,13 +475,13 @@ fn is_zero(graph: &Graph, id: ExprId) -> bool {
             point.values.insert(*atom, stream.next_element());
             point.angles.insert(*atom, stream.next_circle_point());
         }
-        // What has a root or a quotient that does not exist there is not zero as it stands.
+        // An expression with a root or a quotient that does not exist there does not count as zero.
         tape.evaluate(&point)
             .is_some_and(|v| v[0] == FieldElement::ZERO)
     })
 }
 
-/// Expressions with one coordinate put to zero.
+/// Expressions with one coordinate set to zero, also in sines and cosines.
 fn set_to_zero(graph: &mut Graph, roots: &[ExprId], coordinate: usize) -> Vec<ExprId> {
     let atom = Atom::Coordinate(coordinate);
     let nodes: Vec<Node> = graph
@@ -464,6 +495,7 @@ fn set_to_zero(graph: &mut Graph, roots: &[ExprId], coordinate: usize) -> Vec<Ex
         let (Node::Sin(angle) | Node::Cos(angle)) = &node else {
             continue;
         };
+        // The angle without the coordinate.
         let rest = AtomAngleSum::new(angle.terms().iter().copied().filter(|(a, _)| *a != atom));
         let (cosine, sine) = graph.cos_sin(angle, 0);
         let (c, s) = graph.cos_sin(&rest, 0);
@@ -475,9 +507,9 @@ fn set_to_zero(graph: &mut Graph, roots: &[ExprId], coordinate: usize) -> Vec<Ex
     graph.substitute(roots, &replacements)
 }
 
-/// Whether the steps close the loop, with the first roots in the field that exist.
+/// Whether the steps close the loop, tested at points of the field at which all roots exist.
 fn is_loop_closed(graph: &Graph, residual: &[ExprId], steps: &[(usize, ClosureSolution)]) -> bool {
-    /// Draws until roots exist; half of them do at each step with a root.
+    /// Largest number of draws; at each step with a root about half of them fail.
     const DRAWS: usize = 200;
     let tapes: Vec<EvaluationTape> = steps
         .iter()
@@ -487,6 +519,7 @@ fn is_loop_closed(graph: &Graph, residual: &[ExprId], steps: &[(usize, ClosureSo
             EvaluationTape::new(graph, &roots)
         })
         .collect();
+    // The residuals, evaluated after all steps.
     let target = EvaluationTape::new(graph, residual);
     let mut all = residual.to_vec();
     for (_, solved) in steps {
@@ -501,6 +534,7 @@ fn is_loop_closed(graph: &Graph, residual: &[ExprId], steps: &[(usize, ClosureSo
             point.values.insert(*atom, stream.next_element());
             point.angles.insert(*atom, stream.next_circle_point());
         }
+        // The steps overwrite the drawn values of the unknowns.
         for ((coordinate, solved), tape) in steps.iter().zip(&tapes) {
             let values = tape.evaluate(&point)?;
             let atom = Atom::Coordinate(*coordinate);
@@ -513,6 +547,7 @@ fn is_loop_closed(graph: &Graph, residual: &[ExprId], steps: &[(usize, ClosureSo
         let values = target.evaluate(&point)?;
         Some(values.iter().all(|v| *v == FieldElement::ZERO))
     };
+    // Two points must agree, if a second one is found.
     let mut seen = (0..DRAWS).filter_map(|_| draw());
     seen.next() == Some(true) && seen.next() != Some(false)
 }

@@ -1,4 +1,4 @@
-//! Paths along the tree as sums of vectors, each given in a frame that a chain of turns leads to.
+//! Paths along the tree as sums of vectors, each given in a frame that is reached by a chain of rotations.
 
 use modelmill_spec::{FramePoint, Mechanism};
 
@@ -8,14 +8,17 @@ use crate::expr::{AtomAngleSum, ExprId, Graph};
 use crate::tree::KinematicTree;
 use crate::tree::expressions;
 
-/// A stretch of a path: a vector given in a frame that `turns` lead to.
+/// A part of a path: a vector given in a frame that is reached by the rotations `turns`.
 #[derive(Clone)]
 pub(crate) struct PathSegment {
+    /// Rotations from the frame of the sum to that of the vector, outermost first.
     pub(crate) turns: Vec<AxisRotation>,
+    /// Components in that frame, m.
     pub(crate) vector: SymbolicVector,
 }
 
-/// Position of a point in a frame up its tree, as stretches: `start` turns stand in front of all.
+/// Position of a point in a frame further up the tree, as segments. `links` leads to the point, and `at` is its
+/// position in the last link; the rotations `start` come before all others.
 pub(crate) fn path_segments(
     tree: &KinematicTree,
     links: &[usize],
@@ -24,6 +27,7 @@ pub(crate) fn path_segments(
 ) -> Vec<PathSegment> {
     let mut turns = start.to_vec();
     let mut path = Vec::new();
+    // Each link adds its origin in the frame of its parent, then its own rotations.
     for &i in links {
         let link = &tree.links[i];
         path.push(PathSegment {
@@ -35,15 +39,17 @@ pub(crate) fn path_segments(
         }
     }
     path.push(PathSegment { turns, vector: *at });
+    // Zero vectors contribute nothing.
     path.retain(|stretch| stretch.vector != vector::ZERO);
     path
 }
 
-/// The fixed rotations from the root of a path to the axis of its first turning joint; `None` if nothing turns.
+/// The fixed rotations from the root of a path to the axis of its first revolute joint; `None` if it has none.
 pub(crate) fn fixed_rotations(tree: &KinematicTree, links: &[usize]) -> Option<Vec<AxisRotation>> {
     let mut turns = Vec::new();
     for &i in links {
         let link = &tree.links[i];
+        // Rotations before a joint are fixed, and so is that of a joint that is not revolute.
         for turn in &link.pre {
             push_rotation(&mut turns, turn);
         }
@@ -55,6 +61,7 @@ pub(crate) fn fixed_rotations(tree: &KinematicTree, links: &[usize]) -> Option<V
     None
 }
 
+/// The sum of the vectors of a path, each rotated into the common frame, m.
 pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicVector {
     let vectors: Vec<SymbolicVector> = path
         .iter()
@@ -69,6 +76,7 @@ pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicV
     graph.add_vectors(&vectors)
 }
 
+/// Position of a point in its own frame, as expressions, m.
 pub(crate) fn local_position(
     graph: &mut Graph,
     point: &FramePoint,
@@ -80,7 +88,7 @@ pub(crate) fn local_position(
     ])
 }
 
-/// Position of a point in the base frame.
+/// Position of a point in the base frame, m.
 pub(crate) fn position_in_base(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -93,23 +101,27 @@ pub(crate) fn position_in_base(
     Ok(sum_segments(graph, &path))
 }
 
-/// The paths of two points from the frame that both hang on, and the points' positions in their own frames.
+/// The paths to two points from their last common frame, and the points' positions in their own frames.
 pub(crate) struct PointPairPath<'a> {
+    /// Links from the common frame to each point.
     pub(crate) paths: [&'a [usize]; 2],
+    /// Position of each point in its last link, m.
     pub(crate) at: [SymbolicVector; 2],
 }
 
 impl PointPairPath<'_> {
-    /// The vector from the second point to the first as stretches, in the common frame turned by `start`.
+    /// The vector from the second point to the first as segments, in the common frame rotated by `start`.
     pub(crate) fn segments(
         &self,
         graph: &mut Graph,
         tree: &KinematicTree,
         start: &[AxisRotation],
     ) -> Vec<PathSegment> {
+        // Both paths start in the common frame.
         let [first, second] =
             [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
+        // The second path is subtracted.
         for mut stretch in second {
             stretch.vector = stretch.vector.map(|x| graph.neg(x));
             path.push(stretch);
@@ -118,7 +130,7 @@ impl PointPairPath<'_> {
     }
 }
 
-/// Turns the other way, in the opposite order.
+/// The inverse of a product of rotations: each one by the negative angle, in reverse order.
 pub(crate) fn inverse_rotations(turns: &[AxisRotation]) -> Vec<AxisRotation> {
     turns
         .iter()
@@ -131,8 +143,8 @@ pub(crate) fn inverse_rotations(turns: &[AxisRotation]) -> Vec<AxisRotation> {
         .collect()
 }
 
-/// The square of the distance of two points, written in the frame between them in which it is simplest: along a slide
-/// it is the square of one length.
+/// The square of the distance of two points, m^2, written in the frame between them in which it has the fewest nodes:
+/// along a prismatic joint it is the square of one length.
 pub(crate) fn distance_squared(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -144,6 +156,7 @@ pub(crate) fn distance_squared(
         local_position(graph, points[0])?,
         local_position(graph, points[1])?,
     ];
+    // The part of the tree that both points share has no effect on the distance.
     let paths = points.map(|p| tree.path_to(tree.link_of(p.frame)));
     let common = (paths[0].iter().zip(&paths[1]))
         .take_while(|(x, y)| x == y)
@@ -152,8 +165,10 @@ pub(crate) fn distance_squared(
         paths: [&paths[0][common..], &paths[1][common..]],
         at,
     };
+    // The frame whose expression has the fewest nodes is kept.
     let mut best: Option<(usize, ExprId)> = None;
     let mut try_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
+        // The vector between the points, in the frame that `turns` leads to.
         let path = between.segments(graph, tree, &inverse_rotations(turns));
         let along = sum_segments(graph, &path);
         let square = graph.dot(&along, &along);
@@ -162,6 +177,7 @@ pub(crate) fn distance_squared(
             best = Some((size, square));
         }
     };
+    // The common frame itself is tried first, then the frames after each rotation on the way to either point.
     try_frame(graph, &[]);
     for path in between.paths {
         let mut turns = Vec::new();

@@ -1,9 +1,9 @@
 //! Square roots that need no root sign: a polynomial in cosines, sines, lengths and constants whose square is a given
-//! one, as the yaw of a platform on three equal legs has, or the crossed one of two equal pairs of links.
+//! one. Examples are the yaw of a platform on three equal legs, and the crossed linkage of two equal pairs of links.
 //!
-//! Along a line through a point, the root of a polynomial follows from its value at that point, as a power series. So
-//! the root divided by its value at one point can be evaluated anywhere, with one and the same sign; its coefficients
-//! follow from a linear system. That the square is the radicand is shown at the end.
+//! Along a line through a point, the root of a polynomial is determined by its value at that point, as a power series.
+//! So the root divided by its value at one point can be evaluated anywhere, with one and the same sign. Its
+//! coefficients are the solution of a linear system. Finally it is tested that the square is the radicand.
 //!
 //! Decision: the polynomial is evaluated and never expanded or factored. With it, the yaw of a platform on three
 //! equal legs, crossed parallelograms and deltoids have rational closed forms.
@@ -15,17 +15,19 @@ use modelmill_algebra::univariate::interpolate;
 
 use crate::expr::{Atom, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary};
 
-/// Draws at which a radicand must be a square everywhere, or nowhere, before any work is done.
+/// Number of draws at which a radicand must be a square everywhere, or nowhere, before the polynomial is computed.
 const SQUARE_TESTS: usize = 24;
-/// Most terms that a root may have, and the highest degree in one variable that is looked for.
+/// Largest number of terms of a root.
 const MOST_TERMS: usize = 300;
+/// Highest degree of the radicand in one variable.
 const HIGHEST_DEGREE: usize = 8;
 
 /// A quantity on which the radicand depends.
 #[derive(Clone, Copy)]
 struct RadicandVariable {
+    /// The coordinate or constant.
     atom: Atom,
-    /// Whether it stands in cosines and sines.
+    /// Whether it occurs in cosines and sines.
     is_angle: bool,
     /// Its degree in the root, in cosine and sine together for an angle.
     degree: usize,
@@ -34,8 +36,8 @@ struct RadicandVariable {
 /// A monomial: for every variable the exponent of its value, or of its cosine and (0 or 1) sine.
 type RadicandMonomial = Vec<(usize, usize)>;
 
-/// The polynomial whose square an expression is, with either sign; `None` if there is none, or none with short
-/// coefficients.
+/// The polynomial whose square an expression is, with either sign; `None` if there is none, or if its coefficients are
+/// no short fractions.
 pub(crate) fn exact_root(graph: &mut Graph, radicand: ExprId) -> Option<ExprId> {
     let tape = EvaluationTape::new(graph, &[radicand]);
     let mut variables = radicand_variables(graph, radicand)?;
@@ -43,12 +45,14 @@ pub(crate) fn exact_root(graph: &mut Graph, radicand: ExprId) -> Option<ExprId> 
     if !may_be_square(&tape, &variables, &mut stream) {
         return None;
     }
+    // The root has half the degree of the radicand.
     for k in 0..variables.len() {
         variables[k].degree = radicand_degree(&tape, &variables, k, &mut stream)? / 2;
     }
     let monomials = root_monomials(&variables)?;
     let factors = root_coefficients(&tape, &variables, &monomials, &mut stream)?;
     let root = polynomial_expression(graph, &variables, &monomials, &factors);
+    // The root is known up to a constant factor, whose square is the ratio to the radicand.
     let square = graph.mul(root, root);
     let ratio = constant_ratio(graph, &variables, radicand, square, &mut stream)?;
     if ratio.is_negative() || ratio.is_zero() {
@@ -59,9 +63,11 @@ pub(crate) fn exact_root(graph: &mut Graph, radicand: ExprId) -> Option<ExprId> 
     Some(graph.mul(scale, root))
 }
 
-/// What a polynomial depends on; `None` if it is none, or an atom stands both in angles and outside.
+/// The quantities on which a polynomial depends; `None` if the expression is no polynomial, or if an atom occurs both
+/// in angles and outside.
 fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVariable>> {
     let mut found: Vec<RadicandVariable> = Vec::new();
+    // Records an atom, and returns whether it may occur in this way.
     let mut note = |atom: Atom, is_angle: bool| {
         match found.iter().find(|v| v.atom == atom) {
             Some(known) => return known.is_angle == is_angle,
@@ -73,6 +79,7 @@ fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVar
         }
         matches!(atom, Atom::Coordinate(_) | Atom::Constant(_))
     };
+    // Roots of numbers are constants; other functions are no polynomials.
     let is_sound = graph.nodes_of(&[radicand]).all(|node| match node {
         Node::Atom(atom) => note(*atom, false),
         Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(|atom| note(atom, true)),
@@ -84,9 +91,10 @@ fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVar
     (is_sound && !found.is_empty()).then_some(found)
 }
 
-/// Where each variable goes along a line: its value, or the tangent of half its angle.
+/// A line in the space of the variables, as start and slope per variable: its value, or the tangent of half its angle.
 type VariableLine = Vec<(FieldElement, FieldElement)>;
 
+/// A random line, from a given point or a random one.
 fn random_line(
     variables: &[RadicandVariable],
     start: Option<&[FieldElement]>,
@@ -108,6 +116,7 @@ fn point_on_line(
     let mut point = FieldPoint::default();
     for (variable, (from, by)) in variables.iter().zip(line) {
         let x = *from + t * *by;
+        // Rational parametrisation of the circle by the tangent of half the angle.
         if variable.is_angle {
             let square = x * x;
             let inverse = (FieldElement::ONE + square).inverse()?;
@@ -120,6 +129,7 @@ fn point_on_line(
     Some(point)
 }
 
+/// Whether the radicand is a square at all drawn points, or at none: a square times a constant is either.
 fn may_be_square(
     tape: &EvaluationTape,
     variables: &[RadicandVariable],
@@ -140,7 +150,7 @@ fn may_be_square(
     seen.contains(&0) && seen != [0, 0]
 }
 
-/// The degree of the radicand in one variable, if it is a polynomial of even degree in it.
+/// The degree of the radicand in one variable, if it is a polynomial of even degree in it, up to [`HIGHEST_DEGREE`].
 fn radicand_degree(
     tape: &EvaluationTape,
     variables: &[RadicandVariable],
@@ -148,6 +158,7 @@ fn radicand_degree(
     stream: &mut RandomStream,
 ) -> Option<usize> {
     let mut line = random_line(variables, None, stream);
+    // Only variable k changes along this line.
     for (other, (_, by)) in line.iter_mut().enumerate() {
         if other != k {
             *by = FieldElement::ZERO;
@@ -156,6 +167,7 @@ fn radicand_degree(
     let at_most = |d: usize| if variables[k].is_angle { 2 * d } else { d };
     let mut x: Vec<FieldElement> = Vec::new();
     let mut y: Vec<FieldElement> = Vec::new();
+    // A few points more than coefficients show that the degree is not higher.
     while x.len() < at_most(HIGHEST_DEGREE) + 3 {
         let t = stream.next_element();
         y.push(tape.evaluate(&point_on_line(variables, &line, t)?)?[0]);
@@ -169,7 +181,8 @@ fn radicand_degree(
     })
 }
 
-/// What clears the denominator that an angle brings into a polynomial of some degree in its cosine and sine.
+/// The factor that removes the denominator of an angle's parametrisation from a polynomial of some degree in its cosine
+/// and sine.
 fn clearing_factor(
     variable: &RadicandVariable,
     (from, by): (FieldElement, FieldElement),
@@ -183,10 +196,11 @@ fn clearing_factor(
     (FieldElement::ONE + x * x).power(degree as u64)
 }
 
-/// All monomials of the root; `None` if they are too many.
+/// All monomials of the root; `None` if there are more than [`MOST_TERMS`].
 fn root_monomials(variables: &[RadicandVariable]) -> Option<Vec<RadicandMonomial>> {
     let mut all: Vec<RadicandMonomial> = vec![Vec::new()];
     for variable in variables {
+        // Powers of the variable; for an angle also powers of its cosine times its sine, because sin^2 = 1 - cos^2.
         let mut own: Vec<(usize, usize)> = (0..=variable.degree).map(|n| (n, 0)).collect();
         if variable.is_angle {
             own.extend((1..=variable.degree).map(|n| (n - 1, 1)));
@@ -208,14 +222,14 @@ fn root_monomials(variables: &[RadicandVariable]) -> Option<Vec<RadicandMonomial
     Some(all)
 }
 
-/// The coefficients of a multiple of the root whose first coefficient is one.
+/// The coefficients of the multiple of the root whose first coefficient that is not zero is 1.
 fn root_coefficients(
     tape: &EvaluationTape,
     variables: &[RadicandVariable],
     monomials: &[RadicandMonomial],
     stream: &mut RandomStream,
 ) -> Option<Vec<Rational>> {
-    /// Rows beyond those that settle the coefficients: a wrong one would be seen.
+    /// Number of rows in addition to the coefficients: they detect a wrong solution.
     const MORE: usize = 8;
     let start: Vec<FieldElement> = variables.iter().map(|_| stream.next_element()).collect();
     let mut rows: Vec<Vec<FieldElement>> = Vec::new();
@@ -223,6 +237,7 @@ fn root_coefficients(
         let line = random_line(variables, Some(&start), stream);
         rows.extend(rows_along(tape, variables, monomials, &line, stream)?);
     }
+    // Unknowns are the coefficients and the scale of the root; the solution must be unique.
     let solutions = null_space(rows, monomials.len() + 1);
     let [solution] = solutions.as_slice() else {
         return None;
@@ -238,7 +253,8 @@ fn root_coefficients(
         .collect()
 }
 
-/// Along a line the monomials and the root over its value at the line's start, at some places.
+/// Rows of the linear system from one line: at several places the values of the monomials, then the negative of the
+/// root divided by its value at the start of the line.
 fn rows_along(
     tape: &EvaluationTape,
     variables: &[RadicandVariable],
@@ -246,6 +262,7 @@ fn rows_along(
     line: &VariableLine,
     stream: &mut RandomStream,
 ) -> Option<Vec<Vec<FieldElement>>> {
+    // Degree of the root along the line, after its denominators are removed.
     let half: usize = variables
         .iter()
         .map(|v| if v.is_angle { 2 * v.degree } else { v.degree })
@@ -257,6 +274,7 @@ fn rows_along(
             .map(|(v, l)| clearing_factor(v, *l, t, times * v.degree))
             .fold(FieldElement::ONE, |product, x| product * x)
     };
+    // The radicand along the line as a polynomial, from enough values.
     let places: Vec<FieldElement> = (0..=2 * half).map(|_| stream.next_element()).collect();
     let values: Option<Vec<FieldElement>> = places
         .iter()
@@ -267,6 +285,7 @@ fn rows_along(
     let at_start = cleared_by(FieldElement::ZERO, 1);
     let rows = places[..=half].iter().map(|t| {
         let point = point_on_line(variables, line, *t)?;
+        // Horner's scheme.
         let value = root
             .iter()
             .rev()
@@ -282,11 +301,12 @@ fn rows_along(
     rows.collect()
 }
 
-/// The first `n` coefficients of the root of a polynomial over its value at zero.
+/// The first `n` coefficients of the root of a polynomial, divided by the root's value at zero.
 fn series_root(square: &[FieldElement], n: usize) -> Option<Vec<FieldElement>> {
     let inverse = square.first()?.inverse()?;
     let half = (FieldElement::ONE + FieldElement::ONE).inverse()?;
     let mut root = vec![FieldElement::ONE];
+    // Coefficient k of the square of the series has twice the new coefficient and products of known ones.
     for k in 1..n {
         let whole = square.get(k).map_or(FieldElement::ZERO, |c| *c * inverse);
         let known = (1..k).fold(FieldElement::ZERO, |sum, i| sum + root[i] * root[k - i]);
@@ -295,6 +315,7 @@ fn series_root(square: &[FieldElement], n: usize) -> Option<Vec<FieldElement>> {
     Some(root)
 }
 
+/// The value of a monomial at a point of the field.
 fn monomial_value(
     variables: &[RadicandVariable],
     powers: &RadicandMonomial,
@@ -312,7 +333,7 @@ fn monomial_value(
     all.fold(FieldElement::ONE, |product, x| product * x)
 }
 
-/// The polynomial as an expression.
+/// The polynomial as an expression of the graph.
 fn polynomial_expression(
     graph: &mut Graph,
     variables: &[RadicandVariable],
@@ -340,11 +361,12 @@ fn polynomial_expression(
     graph.sum(&terms)
 }
 
+/// A degree as an exponent of the graph.
 fn exponent(n: usize) -> i32 {
     i32::try_from(n).expect("degrees are small")
 }
 
-/// The rational number that one expression is of another, if it is one: shown at a few points.
+/// The constant rational ratio of two expressions, if it is constant; tested at a few points.
 fn constant_ratio(
     graph: &Graph,
     variables: &[RadicandVariable],
@@ -358,6 +380,7 @@ fn constant_ratio(
         let values = tape.evaluate(&point_on_line(variables, &line, FieldElement::ZERO)?)?;
         Some(values[0] * values[1].inverse()?)
     };
+    // The ratio must be the same at all points.
     let ratio = draw()?;
     for _ in 0..3 {
         if draw()? != ratio {

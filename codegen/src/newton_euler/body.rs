@@ -1,4 +1,4 @@
-//! Inertia of one link in the form that suits its motion, and the wrench that moves it.
+//! Inertia of one link in the form that fits its motion, and the wrench that moves it.
 
 use std::collections::BTreeMap;
 
@@ -8,28 +8,32 @@ use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::KinematicTree;
 
-/// The diagonal of the inertia.
+/// The diagonal of the inertia, in one of two forms.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum InertiaDiagonal {
-    /// Moments of inertia about x, y and z.
+    /// Moments of inertia about x, y and z, kg m^2.
     Moments(SymbolicVector),
-    /// Second moments of mass along x and y, where that along z is zero.
+    /// Second moments of mass along x and y, kg m^2; that along z is zero.
     Flat([ExprId; 2]),
 }
 
-/// Inertia of one link.
+/// Inertia of one link about its origin, in its own axes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BodyInertia {
+    /// Mass, kg.
     pub(crate) mass: ExprId,
-    /// First moment, as forces and as moments see it.
+    /// First moment in the balance of forces, kg m.
     pub(crate) force_moment: SymbolicVector,
+    /// First moment in the balance of moments, kg m.
     pub(crate) moment_moment: SymbolicVector,
+    /// Diagonal of the inertia.
     pub(crate) spread: InertiaDiagonal,
-    /// Products of inertia yz, xz, xy: opposite to x, y, z.
+    /// Products of inertia yz, xz, xy, kg m^2: in positions opposite to x, y, z.
     pub(crate) products: SymbolicVector,
 }
 
 impl BodyInertia {
+    /// Collects the elements of one link.
     pub(crate) fn new(inertia: &InertiaFactors) -> Self {
         let element = |e: InertiaElement| inertia[e.index()];
         let inertia = |i| element(InertiaElement::Inertia(i));
@@ -37,6 +41,7 @@ impl BodyInertia {
             mass: element(InertiaElement::Mass),
             force_moment: [0, 1, 2].map(|i| element(InertiaElement::ForceMoment(i))),
             moment_moment: [0, 1, 2].map(|i| element(InertiaElement::MomentMoment(i))),
+            // Elements are stored in the order xx, xy, xz, yy, yz, zz.
             spread: InertiaDiagonal::Moments([0, 3, 5].map(inertia)),
             products: [4, 2, 1].map(inertia),
         }
@@ -51,12 +56,13 @@ impl BodyInertia {
         products: vector::ZERO,
     };
 
-    /// The body in axes from which its own are turned about z.
+    /// The body in axes from which its own axes are rotated about z by `turn`.
     pub(crate) fn rotate(&self, graph: &mut Graph, turn: &AxisRotation) -> Self {
         let (c, s) = graph.cos_sin(&turn.sum, turn.pi12);
         let force_moment = graph.rotate_out(turn, &self.force_moment);
         let moment_moment = graph.rotate_out(turn, &self.moment_moment);
         let [yz, xz, xy] = self.products;
+        // The products with z rotate as a vector.
         let [xz, yz, _] = graph.rotate_out(turn, &[xz, yz, Graph::ZERO]);
         let mut turned = Self {
             mass: self.mass,
@@ -65,18 +71,21 @@ impl BodyInertia {
             spread: self.spread,
             products: [yz, xz, xy],
         };
-        // What is left turns by twice the angle about its mean. Second moments turn as moments of inertia do, but
-        // products of inertia are second moments with the sign changed.
+        // The other elements rotate by twice the angle about their mean. Second moments rotate as moments of inertia
+        // do, but products of inertia are second moments with the opposite sign.
         let (xx, yy, mixed) = match self.spread {
             InertiaDiagonal::Moments([xx, yy, _]) => (xx, yy, xy),
             InertiaDiagonal::Flat([xx, yy]) => (xx, yy, graph.neg(xy)),
         };
+        // A round body is the same in all directions across z.
         if xx == yy && xy == Graph::ZERO {
             return turned;
         }
+        // Half the sum and half the difference of the two diagonal elements.
         let half = Rational::new(1, 2);
         let mean = graph.linear_combination([(xx, half.clone()), (yy, half.clone())]);
         let apart = graph.linear_combination([(xx, half.clone()), (yy, -&half)]);
+        // Sine and cosine of twice the angle.
         let twice = graph.scale(s, &Rational::integer(2));
         let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
         let cosine = graph.sub(Graph::ONE, ss);
@@ -98,14 +107,15 @@ impl BodyInertia {
     }
 }
 
-/// Moves second moments along a joint's axis to what carries it. A line along the axis without mass and first moment
-/// moves alike on both sides of the joint, so forces stay the same and one number less is multiplied.
+/// Moves second moments along a joint's axis to the link that carries it. A line along the axis without mass and first
+/// moment moves equally on both sides of the joint. So the forces stay the same, and one multiplication less is needed.
 pub(crate) fn flatten_along_axes(
     graph: &mut Graph,
     tree: &KinematicTree,
     motion: &TreeMotion,
     bodies: &mut BTreeMap<usize, BodyInertia>,
 ) {
+    // From the ends of the tree to the base, since a parent receives from its children.
     for i in (0..tree.links.len()).rev() {
         let link = &tree.links[i];
         let Some((axis, _)) = link.axis else {
@@ -117,6 +127,7 @@ pub(crate) fn flatten_along_axes(
         let InertiaDiagonal::Moments([xx, yy, zz]) = body.spread else {
             continue;
         };
+        // Second moment along an axis from the three moments of inertia.
         let half = Rational::new(1, 2);
         let mut moment = |less: ExprId, a: ExprId, b: ExprId| {
             let terms = [(a, half.clone()), (b, half.clone()), (less, -&half)];
@@ -124,6 +135,7 @@ pub(crate) fn flatten_along_axes(
         };
         let (x, y, z) = (moment(xx, yy, zz), moment(yy, xx, zz), moment(zz, xx, yy));
         body.spread = InertiaDiagonal::Flat([x, y]);
+        // On the parent, a mass distribution along the axis has moments about the two other axes.
         let Some(parent) = link.parent else { continue };
         let parent = bodies.entry(parent).or_insert(BodyInertia::NONE);
         if let InertiaDiagonal::Moments(moments) = &mut parent.spread {
@@ -136,8 +148,9 @@ pub(crate) fn flatten_along_axes(
     }
 }
 
-/// Wrenches of all bodies; those at the ends of the tree on the fixed side of their joints if `turn_ends`, since there
-/// it is cheaper to turn the inertia than all of the motion.
+/// Wrenches of all bodies, each with its link and the side of the joint on which it is given. With `turn_ends`, bodies
+/// at the ends of the tree get theirs on the fixed side, because it is cheaper to rotate the inertia than the complete
+/// motion.
 pub(crate) fn wrenches(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -147,9 +160,10 @@ pub(crate) fn wrenches(
 ) -> Vec<(usize, JointSide, SymbolicWrench)> {
     let mut wrenches = Vec::new();
     for (i, body) in bodies {
+        // A link without children.
         let is_end = !tree.links.iter().any(|link| link.parent == Some(*i));
         let mut on_fixed_side = || {
-            // Only the moments of flat bodies do without the angular acceleration.
+            // Only the moments of flat bodies do not need the angular acceleration.
             let InertiaDiagonal::Flat(_) = body.spread else {
                 return None;
             };
@@ -171,7 +185,7 @@ pub(crate) fn wrenches(
 }
 
 impl TreeMotion {
-    /// The wrench that moves a body along with `link`.
+    /// The wrench that moves a body along with `link`, about the link's origin and in its axes.
     pub(crate) fn wrench(
         &self,
         graph: &mut Graph,
@@ -182,6 +196,7 @@ impl TreeMotion {
     }
 }
 
+/// Newton's and Euler's equations of one body: force in N, and moment about the origin in N m.
 fn wrench(graph: &mut Graph, moved: &LinkMotion, body: &BodyInertia) -> SymbolicWrench {
     let LinkMotion {
         omega,
@@ -191,11 +206,13 @@ fn wrench(graph: &mut Graph, moved: &LinkMotion, body: &BodyInertia) -> Symbolic
         differences,
         ..
     } = moved;
+    // Force: mass times the acceleration of the origin, plus the field times the first moment.
     let mut force = graph.scale_vector(body.mass, acceleration);
     for i in 0..3 {
         let swung = graph.dot(&field[i], &body.force_moment);
         force[i] = graph.add(force[i], swung);
     }
+    // Moment of the accelerated origin.
     let lever = graph.cross(&body.moment_moment, acceleration);
     let off = body.products;
     let moment = std::array::from_fn(|i| {
@@ -207,6 +224,7 @@ fn wrench(graph: &mut Graph, moved: &LinkMotion, body: &BodyInertia) -> Symbolic
             graph.mul(off[i], differences[i]),
             lever[i],
         ];
+        // Euler's equation for the diagonal of the inertia.
         match body.spread {
             InertiaDiagonal::Moments(diagonal) => {
                 let spread = graph.sub(diagonal[k], diagonal[j]);

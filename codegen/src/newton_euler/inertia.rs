@@ -1,4 +1,4 @@
-//! Inertia of the links as polynomials in the dynamic parameters, and from them the products of eq. (5).
+//! Inertia of the links as polynomials in the dynamic parameters, and the products of parameters of eq. (5).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,17 +12,22 @@ use crate::newton_euler::{ELEMENTS, InertiaElement, InertiaFactors};
 use crate::tree::KinematicTree;
 use crate::tree::expressions::{self, ParameterMonomial, ParameterPolynomial};
 
-/// For every product of parameters, the inertia that it has on each link.
+/// The inertia of each link that every product of parameters is multiplied with.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct InertiaByProduct(BTreeMap<ParameterMonomial, BTreeMap<usize, InertiaFactors>>);
 
 impl InertiaByProduct {
+    /// Collects the inertia of all parts and lumped masses, also those of effects.
+    ///
+    /// # Errors
+    /// A [`DeriveError`] of an expression that cannot be written as a polynomial in the parameters.
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
         tree: &KinematicTree,
     ) -> Result<Self, DeriveError> {
         let mut by_product = Self::default();
+        // Parts and lumped masses of the file.
         for part in &mechanism.parts {
             let elements = part_elements(graph, &part.inertial)?;
             by_product.add_elements(graph, tree.link_of(part.frame), elements);
@@ -31,6 +36,7 @@ impl InertiaByProduct {
             let elements = lump_elements(graph, lump)?;
             by_product.add_elements(graph, tree.link_of(lump.frame), elements);
         }
+        // Effects may add bodies, or point masses at points.
         for effect in &mechanism.effects {
             for part in &effect.bodies.parts {
                 let elements = part_elements(graph, &part.inertial)?;
@@ -40,9 +46,11 @@ impl InertiaByProduct {
                 let elements = lump_elements(graph, lump)?;
                 by_product.add_elements(graph, tree.link_of(lump.frame), elements);
             }
+            // Effects with mechanics of their own are not additional masses.
             if effect.mechanics.is_some() {
                 continue;
             }
+            // The terms of an effect at a point are masses there.
             for place in &effect.places {
                 let EffectPlace::Point(point) = place else {
                     continue;
@@ -63,7 +71,7 @@ impl InertiaByProduct {
         self.0.keys().cloned().collect()
     }
 
-    /// The inertia of each link that belongs to one product.
+    /// Links and their inertia that belong to one product.
     pub(crate) fn link_inertias(
         &self,
         product: &ParameterMonomial,
@@ -75,12 +83,13 @@ impl InertiaByProduct {
             .map(|(link, inertia)| (*link, inertia))
     }
 
-    /// The inertia of each link when every product has the value that `value` gives it.
+    /// The inertia of each link if every product has the value that `value` returns.
     pub(crate) fn total_inertias(
         &self,
         graph: &mut Graph,
         value: impl Fn(&ParameterMonomial) -> ExprId,
     ) -> BTreeMap<usize, InertiaFactors> {
+        // Terms of every element of every link.
         let mut terms: BTreeMap<usize, [Vec<ExprId>; ELEMENTS]> = BTreeMap::new();
         for (product, links) in &self.0 {
             let value = value(product);
@@ -97,13 +106,14 @@ impl InertiaByProduct {
             .collect()
     }
 
+    /// Adds the elements of a part to its link; `None` is the base.
     fn add_elements(
         &mut self,
         graph: &mut Graph,
         link: Option<usize>,
         elements: [ParameterPolynomial; ELEMENTS],
     ) {
-        // What is fixed to the base moves nothing; its products stay known, with no inertia anywhere.
+        // Parts that are fixed to the base have no effect on the motion. Their products are listed without any inertia.
         for (element, polynomial) in elements.into_iter().enumerate() {
             for (product, factor) in polynomial.0 {
                 let links = self.0.entry(product).or_default();
@@ -116,8 +126,9 @@ impl InertiaByProduct {
     }
 }
 
-/// The mass that a term of an effect adds at a point.
+/// The point mass that a term of an effect adds at a point.
 fn added_point_mass(point: &FramePoint, term: &EffectTerm) -> LumpedMass {
+    // The mass is the parameter times the term's expression.
     let parameter = ExactExpression::Symbol(modelmill_spec::ModelSymbol::Parameter(term.parameter));
     LumpedMass {
         mass: ExactExpression::Product(vec![parameter, term.expression.clone()]),
@@ -128,12 +139,14 @@ fn added_point_mass(point: &FramePoint, term: &EffectTerm) -> LumpedMass {
     }
 }
 
+/// Elements of a part about its frame's origin, as polynomials in the parameters.
 fn part_elements(
     graph: &mut Graph,
     inertial: &PartInertia,
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
     match inertial {
+        // Linear parameters are the elements themselves, with one first moment for both balances.
         PartInertia::Linear {
             mass,
             first_moment,
@@ -150,6 +163,7 @@ fn part_elements(
                     expressions::polynomial(graph, &inertia[i])?;
             }
         }
+        // Steiner's rule from the centre of mass, plus the inertia about it.
         PartInertia::AboutCentre {
             mass,
             centre,
@@ -168,10 +182,12 @@ fn part_elements(
     Ok(elements)
 }
 
+/// Elements of a lumped mass, which may act at different points in the two balances.
 fn lump_elements(
     graph: &mut Graph,
     lump: &LumpedMass,
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+    // A lumped mass may be shared by several bodies, each with its share.
     let share = Rational::from(lump.share.clone());
     let mass = expressions::polynomial(graph, &lump.mass)?.scale(&share, graph);
     let force_at = polynomials(graph, &lump.force_at)?;
@@ -179,6 +195,7 @@ fn lump_elements(
     point_elements(graph, &mass, &force_at, &moment_at)
 }
 
+/// Three components as polynomials in the parameters.
 fn polynomials(
     graph: &mut Graph,
     exact: &[ExactExpression; 3],
@@ -190,7 +207,7 @@ fn polynomials(
     ])
 }
 
-/// A point mass: `m`, `m c` and `m (c'c 1 - c c')` about the origin (Steiner).
+/// Elements of a point mass: `m`, `m c` and `m (c'c 1 - c c')` about the origin (Steiner).
 fn point_elements(
     graph: &mut Graph,
     mass: &ParameterPolynomial,
@@ -198,11 +215,13 @@ fn point_elements(
     moment_at: &[ParameterPolynomial; 3],
 ) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
+    // The first moment is the mass times the place, separately for both balances.
     elements[InertiaElement::Mass.index()] = mass.clone();
     for i in 0..3 {
         elements[InertiaElement::ForceMoment(i).index()] = mass.times(&force_at[i], graph)?;
         elements[InertiaElement::MomentMoment(i).index()] = mass.times(&moment_at[i], graph)?;
     }
+    // Second moments of the mass about the origin.
     let mut second = |i: usize, j: usize| {
         let product = moment_at[i].times(&moment_at[j], graph)?;
         mass.times(&product, graph)

@@ -11,36 +11,45 @@ use crate::expr::{Atom, ExprId, Graph, Rational};
 use crate::tree::free::FreeMotion;
 use crate::tree::{KinematicTree, TreeLink};
 
-/// Motion of every link in its own frame.
+/// Motion of every link, in its own frame.
 pub(crate) struct TreeMotion {
+    /// Motion by link.
     pub(super) links: Vec<LinkMotion>,
+    /// Motion of the base: at standstill, with the acceleration of free fall reversed.
     base: LinkMotion,
+    /// Acceleration of gravity in the base frame, m/s^2.
     gravity: SymbolicVector,
+    /// How the recursion is written.
     style: RecursionStyle,
 }
 
+/// Motion of one link, in the axes of its own frame.
 #[derive(Clone)]
 pub(super) struct LinkMotion {
-    /// Angular velocity and acceleration.
+    /// Angular velocity, rad/s.
     pub(super) omega: SymbolicVector,
+    /// Angular acceleration, rad/s^2.
     pub(super) alpha: SymbolicVector,
-    /// Acceleration of the origin, gravity taken off.
+    /// Acceleration of the origin minus that of gravity, m/s^2.
     pub(super) acceleration: SymbolicVector,
-    /// `[alpha]x + [omega]x [omega]x`, by rows.
+    /// `[alpha]x + [omega]x [omega]x`, by rows, 1/s^2: it maps a position in the link to its acceleration relative to
+    /// the origin.
     pub(super) field: [SymbolicVector; 3],
-    /// `omega_j^2 - omega_k^2` for cyclic i, j, k.
+    /// `omega_j^2 - omega_k^2` for cyclic i, j, k, 1/s^2.
     pub(super) differences: SymbolicVector,
-    /// Angular velocity of what carries the joint, on the fixed side of it.
+    /// Angular velocity of the part that carries the joint, on the fixed side of the joint, rad/s.
     pub(super) carried: SymbolicVector,
 }
 
 impl LinkMotion {
-    /// From angular velocity and acceleration, entry by entry.
+    /// Computes the field from angular velocity and acceleration, entry by entry. The acceleration of the origin is
+    /// zero.
     fn from_angular_motion(
         graph: &mut Graph,
         omega: SymbolicVector,
         alpha: SymbolicVector,
     ) -> Self {
+        // The diagonal of [omega]x [omega]x is minus the sum of the two other squares.
         let square = omega.map(|w| graph.mul(w, w));
         let mut field = [vector::ZERO; 3];
         let mut differences = vector::ZERO;
@@ -66,8 +75,9 @@ impl LinkMotion {
         }
     }
 
-    /// From the angular velocity, the last column of the field, and the angular acceleration about z: no square and no
-    /// product of the others is needed twice, and the rest of the angular acceleration follows.
+    /// Computes the field from the angular velocity, its last column, and the angular acceleration about z. No square
+    /// and no product is computed twice, and the other components of the angular acceleration are determined by the
+    /// column.
     fn from_axis_column(
         graph: &mut Graph,
         omega: SymbolicVector,
@@ -75,6 +85,7 @@ impl LinkMotion {
         [xz, yz, zz]: SymbolicVector,
     ) -> Self {
         let [wx, wy, wz] = omega;
+        // The last column is (omega_x omega_z + alpha_y, omega_y omega_z - alpha_x, ...).
         let (x_z, y_z) = (graph.mul(wx, wz), graph.mul(wy, wz));
         let alpha = [graph.sub(y_z, yz), graph.sub(xz, x_z), alpha_z];
         let (zx, zy) = (graph.sub(x_z, alpha[1]), graph.add(y_z, alpha[0]));
@@ -97,6 +108,7 @@ impl LinkMotion {
     }
 }
 
+/// A linear combination of coordinates, rates or accelerations, which `atom` chooses.
 fn weighted_sum(
     graph: &mut Graph,
     atom: fn(usize) -> Atom,
@@ -109,7 +121,8 @@ fn weighted_sum(
     graph.sum(&terms)
 }
 
-/// Coordinates that turn a link about its axis relative to what carries the first joint of `style`, with their factors.
+/// Coordinates that rotate a link about its axis relative to the part that carries the first joint of `style`, with
+/// their factors.
 fn rotating_coordinates(style: RecursionStyle, link: &TreeLink) -> Vec<(usize, Rational)> {
     let rational = |(c, n): (usize, i32)| (c, Rational::integer(i64::from(n)));
     if !style.across_parallel_axes {
@@ -127,13 +140,15 @@ fn rotating_coordinates(style: RecursionStyle, link: &TreeLink) -> Vec<(usize, R
         .collect()
 }
 
-/// The motion of every link.
+/// The motion of every link as expressions in coordinates, rates and accelerations. `gravity` is in the base frame,
+/// m/s^2.
 pub(crate) fn forward_recursion(
     graph: &mut Graph,
     tree: &KinematicTree,
     gravity: &SymbolicVector,
     style: RecursionStyle,
 ) -> TreeMotion {
+    // An upward acceleration of the base replaces the weight of all bodies.
     let mut base = LinkMotion::from_angular_motion(graph, vector::ZERO, vector::ZERO);
     base.acceleration = gravity.map(|g| graph.neg(g));
     let mut motion = TreeMotion {
@@ -150,13 +165,16 @@ pub(crate) fn forward_recursion(
 }
 
 impl TreeMotion {
+    /// The motion of a link, or of the base for `None`.
     fn motion_of_link(&self, link: Option<usize>) -> &LinkMotion {
         link.map_or(&self.base, |p| &self.links[p])
     }
 
+    /// The motion of link `i` from that of its parent.
     fn derive_link_motion(&self, graph: &mut Graph, tree: &KinematicTree, i: usize) -> LinkMotion {
         let style = self.style;
         let link = &tree.links[i];
+        // A free body has its twist as coordinates and needs no recursion.
         if let Some(body) = &link.free {
             let free = FreeMotion::new(graph, body, &self.gravity);
             let mut moved = LinkMotion::from_angular_motion(graph, free.omega, free.alpha);
@@ -164,16 +182,19 @@ impl TreeMotion {
             moved.carried = free.omega;
             return moved;
         }
+        // Angular motion of the part that carries the first joint, in the axes of that joint.
         let first = &tree.links[style.first_rotated_link(tree, i)];
         let fixed = self.motion_of_link(first.parent);
         let turn = style.joint_rotation(link);
         let carried = rotate_into_inner(graph, &first.pre, &fixed.omega);
         let mut omega = graph.rotate_in(turn, &carried);
         let before = rotate_into_inner(graph, &first.pre, &fixed.alpha);
+        // Rates of all joints from there on add up about the common z axis.
         let turning = rotating_coordinates(style, link);
         let rate = weighted_sum(graph, Atom::Rate, turning.iter().cloned());
         let turn_acceleration = weighted_sum(graph, Atom::Acceleration, turning);
         let mut moved = match first.axis {
+            // The joint is along an axis of its parent's frame, so that column of the field is already known.
             Some((axis, positive)) if style.axis_column => {
                 let column = std::array::from_fn(|row| {
                     let entry = fixed.field[row][axis];
@@ -197,6 +218,7 @@ impl TreeMotion {
             }
         };
         moved.carried = carried;
+        // Acceleration of the origin: along the parent's frame, across the joint, then along the axis.
         let column = moved.field.map(|row| row[2]);
         let before = self.acceleration_before(graph, tree, i);
         let turned = graph.rotate_in(&link.joint, &before);
@@ -210,6 +232,7 @@ impl TreeMotion {
         ];
         let acceleration = &mut moved.acceleration;
         acceleration[0] = graph.add(acceleration[0], coriolis[0]);
+        // Acceleration of the prismatic joint along z.
         acceleration[1] = graph.sub(acceleration[1], coriolis[1]);
         let slide_acceleration =
             weighted_sum(graph, Atom::Acceleration, link.slides.iter().cloned());
@@ -217,7 +240,8 @@ impl TreeMotion {
         moved
     }
 
-    /// Acceleration of the point that a link's position leads to across its axis, on the fixed side of its joint.
+    /// Acceleration, on the fixed side of the joint, of the point that is reached before the offset along the joint's
+    /// axis.
     fn acceleration_before(
         &self,
         graph: &mut Graph,
@@ -235,7 +259,8 @@ impl TreeMotion {
         rotate_into_inner(graph, &link.pre, &there)
     }
 
-    /// The same along the axis on to the origin, with the column of the field that belongs to the axis.
+    /// Acceleration of the origin from that of the point before the offset along the axis. `column` is the column of
+    /// the field that belongs to the axis.
     fn acceleration_along_axis(
         &self,
         graph: &mut Graph,
@@ -248,14 +273,14 @@ impl TreeMotion {
         graph.add_vectors(&[*there, moved])
     }
 
-    /// Whether a link turns about anything but a direction along its axis that stands still.
+    /// Whether a link rotates other than about its own z axis.
     pub(crate) fn is_tilting(&self, link: usize) -> bool {
         let [x, y, _] = self.links[link].omega;
         x != Graph::ZERO || y != Graph::ZERO
     }
 
-    /// The moment, on the fixed side of a joint, of a body with no more than a moment of inertia of 1 about its axis:
-    /// it does not depend on how far the joint has turned.
+    /// The moment, on the fixed side of a joint, of a body whose only inertia is a moment of inertia of 1 about the
+    /// joint's axis. It does not depend on the angle of the joint.
     pub(crate) fn axial_moment(&self, graph: &mut Graph, link: usize) -> SymbolicVector {
         let moved = &self.links[link];
         let [x, y, _] = moved.carried;
@@ -264,9 +289,10 @@ impl TreeMotion {
         [y_z, graph.neg(x_z), moved.alpha[2]]
     }
 
-    /// Motion of a link in the axes of its joint's fixed side; `None` if these are not the parent's axes in other order.
+    /// Motion of a link in the axes of its joint's fixed side; `None` if these axes are not a permutation of the
+    /// parent's axes.
     ///
-    /// Only the angular acceleration is missing in it.
+    /// The angular acceleration is left zero in it, so only flat bodies can be used with it.
     pub(super) fn fixed_side_motion(
         &self,
         graph: &mut Graph,
@@ -274,11 +300,13 @@ impl TreeMotion {
         i: usize,
     ) -> Option<LinkMotion> {
         let link = &tree.links[i];
+        // Rotations by quarter turns only exchange axes.
         let quarter = |t: &crate::expr::vector::AxisRotation| t.sum.is_empty() && t.pi12 % 6 == 0;
         if !link.pre.iter().all(quarter) || !link.slides.is_empty() || link.free.is_some() {
             return None;
         }
         let parent = self.motion_of_link(link.parent);
+        // The parent's field in the axes of the joint: columns, then rows.
         let columns: [SymbolicVector; 3] = std::array::from_fn(|j| {
             let column = parent.field.map(|row| row[j]);
             rotate_into_inner(graph, &link.pre, &column)
@@ -294,6 +322,7 @@ impl TreeMotion {
         };
         let rate = weighted_sum(graph, Atom::Rate, terms());
         let turn_acceleration = weighted_sum(graph, Atom::Acceleration, terms());
+        // The joint adds its rate and acceleration about z to the field.
         let twice = graph.scale(rate, &Rational::integer(2));
         for j in 0..2 {
             let swing = graph.mul(twice, omega[j]);
@@ -328,7 +357,7 @@ impl TreeMotion {
         })
     }
 
-    /// The motion that a wrench on a side of a joint is computed with; `None` if there is none for that side.
+    /// The motion with which a wrench on one side of a joint is computed; `None` if it is not available on that side.
     pub(super) fn side_motion(
         &self,
         graph: &mut Graph,

@@ -1,5 +1,5 @@
-//! Forces of all joints above a link, read off in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
-//! joint i and a point on it (virtual power). Axes through one point share the moment about it, and axes and points are
+//! Forces of all joints above a link, computed in the link's own frame: `z_i . (M + (o - c_i) x F)` with the axis of
+//! joint i and a point on it (virtual power). Axes through one point share the moment about it. Axes and points are
 //! shared by all wrenches that are projected in the same frame.
 
 use super::rows::{ForceRows, moment_before_axis_offset};
@@ -8,7 +8,7 @@ use crate::expr::vector::{self, SymbolicVector};
 use crate::expr::{ExprId, Graph};
 use crate::tree::KinematicTree;
 
-/// Leaves the forces of a wrench at all joints above `at`.
+/// Adds the forces of a wrench on link `at` to all joints above it.
 pub(super) fn project_on_joints(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -21,10 +21,13 @@ pub(super) fn project_on_joints(
     let Some((_, above)) = path.split_last() else {
         return;
     };
+    // The moment about the point before the offset along the axis, for which axes and arms are computed.
     let moment = moment_before_axis_offset(graph, style, &tree.links[at], wrench);
     let points = axis_points(graph, tree, &path);
+    // From the nearest axes to the base, in groups of axes that meet in one point.
     let mut rest = above;
     while let Some(last) = rest.last() {
+        // Joints whose axes share the point of the nearest one.
         let n = rest
             .iter()
             .rev()
@@ -32,16 +35,18 @@ pub(super) fn project_on_joints(
             .count();
         let (further, group) = rest.split_at(rest.len() - n);
         rest = further;
+        // A pure moment needs no point.
         let arm = if wrench.has_force() {
             lever_arm(graph, tree, style, *last, points[*last].along, &path)
         } else {
             vector::ZERO
         };
+        // Axes in the frame of the link.
         let axes: Vec<SymbolicVector> = group
             .iter()
             .map(|i| axis_direction(graph, tree, style, *i, at))
             .collect();
-        // One axis alone: the screw's two halves; several: the moment about their point.
+        // Several axes share the moment about their common point. A single axis needs only one component of it.
         let shared = (group.len() > 1).then(|| {
             let lever = graph.cross(&arm, &wrench.force);
             graph.add_vectors(&[moment, lever])
@@ -51,12 +56,14 @@ pub(super) fn project_on_joints(
             let about = match shared {
                 Some(moment) => graph.dot(axis, &moment),
                 None => {
+                    // Virtual power: velocity of the point of action and angular velocity for a unit rate of the joint.
                     let speed = graph.cross(axis, &arm);
                     let turned = graph.dot(axis, &moment);
                     let moved = graph.dot(&speed, &wrench.force);
                     graph.add(turned, moved)
                 }
             };
+            // The force along the axis, for joints that translate.
             let along = if link.slides.is_empty() {
                 Graph::ZERO
             } else {
@@ -67,17 +74,18 @@ pub(super) fn project_on_joints(
     }
 }
 
-/// A point on a joint's axis.
+/// A point on a joint's axis, through which other axes may pass.
 #[derive(Clone, Copy)]
 struct AxisPoint {
     /// Axes with the same number go through the same point.
     group: usize,
-    /// Where it lies on the axis, from the link's origin.
+    /// Its position along the axis, from the link's origin, m.
     along: ExprId,
 }
 
-/// A point for every joint on a path, by link; neighbouring axes that meet share one.
+/// A point for every joint on a path, by link. Neighbouring axes that meet share a point.
 fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<AxisPoint> {
+    // Each axis begins with a point of its own, the origin of its link.
     let mut points = vec![
         AxisPoint {
             group: 0,
@@ -85,7 +93,7 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
         };
         tree.links.len()
     ];
-    // Whether the point of the group may still be moved along its only axis.
+    // Whether the point of the group may still be moved along its only axis: a second axis fixes it.
     let mut is_free = true;
     for (k, i) in path.iter().enumerate() {
         points[*i].group = k;
@@ -93,11 +101,13 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
         let above = k.checked_sub(1).map(|k| path[k]);
         let meets = above.and_then(|above| {
             let (axis, positive) = link.axis?;
+            // The axes meet if the position between them lies in the plane of both, and at the point of the group.
+            // The position without its component along the joint's axis.
             let mut left = link.position;
             let own = std::mem::replace(&mut left[axis], Graph::ZERO);
             let [x, y, z] = left;
             let fits = is_free || points[above].along == z;
-            // A point must stay on both axes: a slide would take it along.
+            // A point must stay on both axes, but a prismatic joint would move it.
             let slides = !link.slides.is_empty() || !tree.links[above].slides.is_empty();
             let meets = axis != 2 && x == Graph::ZERO && y == Graph::ZERO && fits && !slides;
             meets.then(|| (above, z, if positive { graph.neg(own) } else { own }))
@@ -117,7 +127,7 @@ fn axis_points(graph: &mut Graph, tree: &KinematicTree, path: &[usize]) -> Vec<A
     points
 }
 
-/// Direction of a joint's axis in the frame of a link below it.
+/// Direction of a joint's axis in the frame of a link below it, as a unit vector.
 fn axis_direction(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -137,13 +147,14 @@ fn axis_direction(
     let Some(parent) = tree.links[first].parent else {
         return z;
     };
+    // The direction in the parent's frame, rotated to this link.
     let above = axis_direction(graph, tree, style, joint, parent);
     let fixed = rotate_into_inner(graph, &tree.links[first].pre, &above);
     graph.rotate_in(style.joint_rotation(&tree.links[at]), &fixed)
 }
 
-/// From a point on the axis of `joint`, given by its place along it, to the point of the last link of `path` that is
-/// reached before its offset along its own axis, in that link's frame.
+/// Vector from a point on the axis of `joint`, given by its position along it, to the point of the last link of `path`
+/// that is reached before the offset along that link's own axis. In that link's frame, m.
 fn lever_arm(
     graph: &mut Graph,
     tree: &KinematicTree,
@@ -153,21 +164,24 @@ fn lever_arm(
     path: &[usize],
 ) -> SymbolicVector {
     let start = path.iter().position(|i| *i == joint).unwrap_or(0);
-    // On the fixed side of the first of parallel joints; turned on only where these end.
+    // On the fixed side of the first of parallel joints; the rotation is applied only where these end.
     let mut v = [Graph::ZERO, Graph::ZERO, graph.neg(along)];
     let mut above = joint;
     for i in &path[start + 1..] {
         let link = &tree.links[*i];
         let (across, own) = style.split_position(link);
         let turn = style.joint_rotation(&tree.links[above]).clone();
+        // At the end of parallel joints the vector is rotated and the position added in the parent's frame.
         if style.first_rotated_link(tree, *i) == *i {
             v = graph.rotate_in(&turn, &v);
             v = graph.add_vectors(&[v, across]);
             v = rotate_into_inner(graph, &link.pre, &v);
+        // Between parallel joints only the position is rotated.
         } else {
             let across = graph.rotate_out(&turn, &across);
             v = graph.add_vectors(&[v, across]);
         }
+        // The offset along the last link's own axis is not included.
         if Some(i) != path.last() {
             v[2] = graph.add(v[2], own);
         }

@@ -1,4 +1,4 @@
-//! Mass matrix, velocity terms, gravity and effects of a mechanism by itself, for control and simulation.
+//! Mass matrix, velocity terms, gravity and effects of a mechanism as separate programs, for control and simulation.
 //!
 //! With the independent coordinates z, the drives' forces f and the drives' Jacobian J,
 //! `J' f = M(z) z'' + c(z, z') + g(z) + e(z, z')`, all linear in p_min. M is made of composite bodies of the open tree
@@ -29,21 +29,21 @@ use crate::tree::expressions::ParameterMonomial;
 /// Straight-line programs of the equation of motion in the independent coordinates, for given p_min.
 #[derive(Clone, Debug)]
 pub struct DynamicsPrograms {
-    /// M: a row and a column for every independent coordinate, row by row. Those of a quaternion's scalar part, which has no
-    /// rate, hold a one on the diagonal and nothing else.
+    /// M: one row and one column per independent coordinate, row by row. The scalar part of a quaternion has no rate;
+    /// its row and column have a one on the diagonal and zeros elsewhere.
     pub mass_matrix: StraightLineProgram,
-    /// c, what rates alone ask for: centrifugal and Coriolis forces.
+    /// c: generalised forces that depend on the rates, centrifugal and Coriolis forces.
     pub coriolis: StraightLineProgram,
-    /// g: what weight alone asks for.
+    /// g: generalised forces of gravity.
     pub gravity: StraightLineProgram,
-    /// e: what effects ask for where nothing accelerates, such as friction and springs.
+    /// e: generalised forces of the effects at zero acceleration, such as friction and springs.
     pub effects: StraightLineProgram,
-    /// `c + g + e`, at a lower cost than apart, and then J: a row per drive, row by row.
+    /// `c + g + e`, at a lower cost than the three separately, and then J: one row per drive, row by row.
     pub bias: StraightLineProgram,
 }
 
 impl Derivation {
-    /// The equation of motion of the mechanism, ready for forward dynamics. It is derived here, on demand.
+    /// The equation of motion of the mechanism, prepared for forward dynamics. It is derived by this call.
     ///
     /// # Errors
     /// A mechanism with an effect that is not affine in the accelerations.
@@ -61,6 +61,7 @@ impl Derivation {
     }
 }
 
+/// Derives the five programs. `value` is the expression of a product of parameters: a base parameter, or zero.
 fn dynamics(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -71,13 +72,14 @@ fn dynamics(
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
     let still: Vec<ExprId> = (0..n).map(|i| graph.atom(Atom::Acceleration(i))).collect();
-    // Passive coordinates accelerate even where the independent ones do not.
+    // Passive coordinates may accelerate even if the independent ones do not.
     let unaccelerated: BTreeMap<ExprId, ExprId> = projection
         .loops
         .active
         .iter()
         .map(|a| (still[*a], Graph::ZERO))
         .collect();
+    // At standstill all rates and accelerations are zero.
     let mut at_rest = unaccelerated.clone();
     for i in 0..n {
         at_rest.insert(still[i], Graph::ZERO);
@@ -85,10 +87,14 @@ fn dynamics(
     }
 
     check_affine_in_accelerations(graph, mechanism, equations)?;
+    // Generalised forces of the effects, on the independent coordinates.
     let weight = equations.gravity;
     let none = crate::expr::vector::ZERO;
+    // Effects act on the tree and along the drives.
     let effects = equations.effect_forces(graph, mechanism, value)?;
     let effects = equations.project_on_active(graph, &effects.on_tree, &effects.on_drives);
+    // Generalised forces of the bodies under a gravity, with some motions replaced by zero, in the cheapest form;
+    // `more` is added before the cost is compared.
     let bodies = |graph: &mut Graph,
                   gravity: crate::expr::vector::SymbolicVector,
                   frozen: &BTreeMap<ExprId, ExprId>,
@@ -114,11 +120,13 @@ fn dynamics(
             },
         )
     };
+    // c: without gravity and accelerations. g: at standstill. The bias has all terms and ends with the Jacobian.
     let coriolis = bodies(graph, none, &unaccelerated, &[])?;
     let gravity = bodies(graph, weight, &at_rest, &[])?;
     let mut bias = bodies(graph, weight, &unaccelerated, &effects)?;
     bias.extend(projection.drive_jacobian.iter().flatten());
     let mass_matrix = mass_matrix(graph, mechanism, equations, value, &effects);
+    // Each program is lowered with the motions that it does not read set to zero.
     let mut program = |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| {
         closing.program_at(graph, equations, outputs, frozen)
     };
@@ -131,13 +139,14 @@ fn dynamics(
     })
 }
 
-/// Refuses effects whose force is not affine in the accelerations.
+/// Returns an error if the force of an effect is not affine in the accelerations: then M would not exist.
 fn check_affine_in_accelerations(
     graph: &mut Graph,
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
 ) -> Result<(), DeriveError> {
     for effect in &mechanism.effects {
+        // Parameters of this effect are one and all others zero.
         let only = |m: &ParameterMonomial| {
             let of_effect = |t: &modelmill_spec::EffectTerm| m.0 == [(t.parameter.0, 1)];
             if effect.terms.iter().any(of_effect) {
@@ -146,6 +155,7 @@ fn check_affine_in_accelerations(
                 Graph::ZERO
             }
         };
+        // The forces of this effect alone.
         let forces = equations.effect_forces(graph, mechanism, &only)?;
         let forces: Vec<ExprId> = forces.on_tree.into_iter().chain(forces.on_drives).collect();
         if degree_in_accelerations(graph, &forces) > 1 {
@@ -157,7 +167,8 @@ fn check_affine_in_accelerations(
     Ok(())
 }
 
-/// Degree of some expressions as polynomials in the accelerations; more than 1 also for what is no polynomial.
+/// Degree of some expressions as polynomials in the accelerations; 2 stands for more than 1 and for everything that is
+/// no polynomial.
 fn degree_in_accelerations(graph: &Graph, roots: &[ExprId]) -> usize {
     const NONE: usize = 2;
     let mut degree = vec![0; graph.len()];
@@ -190,7 +201,7 @@ fn degree_in_accelerations(graph: &Graph, roots: &[ExprId]) -> usize {
     roots.iter().map(|r| degree[r.index()]).max().unwrap_or(0)
 }
 
-/// M by rows.
+/// M, row by row.
 fn mass_matrix(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -200,8 +211,9 @@ fn mass_matrix(
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
     let n = mechanism.coordinates.len();
+    // Size of M.
     let n_active = projection.loops.active.len();
-    // How every coordinate accelerates with each independent one.
+    // Acceleration of every coordinate per acceleration of each independent one.
     let motion: Vec<Vec<ExprId>> = projection
         .loops
         .active
@@ -217,6 +229,7 @@ fn mass_matrix(
             column
         })
         .collect();
+    // Scalar product of a row and a column.
     let combined = |graph: &mut Graph, row: &[ExprId], column: &[ExprId]| {
         let terms: Vec<ExprId> = row
             .iter()
@@ -225,6 +238,7 @@ fn mass_matrix(
             .collect();
         graph.add_all(&terms)
     };
+    // M is symmetric if forces and moments have the same first moments of mass.
     let inertia = equations.inertia.total_inertias(graph, value);
     let is_symmetric = inertia.values().all(|inertia| {
         (0..3).all(|i| {
@@ -233,11 +247,13 @@ fn mass_matrix(
         })
     });
     let mut matrix = vec![vec![Graph::ZERO; n_active]; n_active];
+    // Composite bodies; of rotating and fixed axes, the cheaper ones are used.
     if is_symmetric {
         let bodies: Vec<(usize, BodyInertia)> = inertia
             .iter()
             .map(|(link, inertia)| (*link, BodyInertia::new(inertia)))
             .collect();
+        // The cheapest style for composite bodies.
         let style = RecursionStyle {
             offset_after_turn: true,
             ..RecursionStyle::PLAIN
@@ -251,6 +267,7 @@ fn mass_matrix(
                 .map(|(link, body)| (*link, frames.rotate_body(graph, *link, body)))
                 .collect();
             let of_tree = newton_euler::mass_matrix(graph, &frames.tree, style, n, &bodies);
+            // The matrix of the tree is projected column by column; the lower triangle follows by symmetry.
             let mut found = vec![vec![Graph::ZERO; n_active]; n_active];
             for b in 0..n_active {
                 let column: Vec<ExprId> = (0..n)
@@ -268,7 +285,8 @@ fn mass_matrix(
             }
         }
     }
-    // Effects, and lumped masses that forces and moments see at different places: as the forces say.
+    // Effects, and lumped masses with different points for forces and moments: derivatives of the forces by the
+    // accelerations.
     let mut forces = effects.to_vec();
     if !is_symmetric {
         let form = TotalForm::PLAIN;
@@ -288,13 +306,14 @@ fn mass_matrix(
         .map(|i| graph.differentiate(&forces, Atom::Acceleration(i)))
         .collect();
     for a in 0..n_active {
+        // Derivatives of one generalised force by all accelerations.
         let row: Vec<ExprId> = slopes.iter().map(|column| column[a]).collect();
         for b in 0..n_active {
             let more = combined(graph, &row, &motion[b]);
             matrix[a][b] = graph.add(matrix[a][b], more);
         }
     }
-    // What has no rate moves nothing: a one on the diagonal keeps the system regular.
+    // A coordinate without a rate moves nothing; a one on the diagonal keeps the matrix regular.
     for a in 0..n_active {
         if !projection.freedoms.contains(&a) {
             matrix[a][a] = Graph::ONE;

@@ -1,5 +1,5 @@
 //! Closes expressions over the active coordinates: passive positions by their closed form, passive rates and
-//! accelerations from the differentiated loops.
+//! accelerations by the differentiated closure equations.
 
 use std::collections::BTreeMap;
 
@@ -20,37 +20,43 @@ use crate::lower::{
 use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
 
-/// Puts the passive coordinates' closed form, rates and accelerations in place.
+/// Replaces passive coordinates, rates and accelerations in expressions.
 #[derive(Clone)]
 pub(crate) struct PassiveClosure {
     /// The order in which the loops are solved, if they have closed forms.
     plan: Option<LoopPlan>,
-    /// How passive angles are computed, where their values are asked for or follow others.
+    /// Rules for passive angles whose value is read or that are coupled to others.
     definitions: Vec<AtomDefinition>,
+    /// Radicands that must not be negative.
     reachable: Vec<ExprId>,
-    /// Nodes replaced by the position's closed form.
+    /// Replacements of passive lengths and of angles that are sums of known ones.
     position: BTreeMap<ExprId, ExprId>,
-    /// Sums of angles whose cosine and sine are known, and what every passive angle is made of.
+    /// Cosine and sine of solved sums of angles.
     solved: Vec<[ExprId; 2]>,
+    /// Every passive angle as a sum of solved and known ones.
     angle_of: BTreeMap<usize, ResolvedAngle>,
-    /// Determinants, with the magnitudes of their terms.
+    /// Determinants with the magnitudes of their terms.
     regular: Vec<(ExprId, ExprId)>,
+    /// Size of the loops, for these magnitudes.
     size: LoopSize,
     /// Whether effects may have no finite value at some states.
     may_be_undefined: bool,
-    /// The passes of lowering that are used.
+    /// The passes of lowering to use.
     passes: &'static [LoweringPass],
 }
 
-/// An angle as a sum of known angles, a multiple of pi/12, and solved angles by position.
+/// An angle as a sum of known angles, a multiple of pi/12, and solved sums by index.
+/// Sum of known angles.
 #[derive(Clone, Debug, Default)]
 struct ResolvedAngle {
+    /// Multiple of pi/12.
     known: AtomAngleSum,
+    /// Indices of solved sums with their integer factors.
     pi12: i32,
     solved: Vec<(usize, i32)>,
 }
 
-/// The whole number of quarter turns that is nearest to an angle.
+/// The nearest integer number of quarter turns of an angle in rad.
 fn quarter_turns(angle: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "bounded")]
     let quarters = (angle / std::f64::consts::FRAC_PI_2)
@@ -60,6 +66,7 @@ fn quarter_turns(angle: f64) -> i32 {
 }
 
 impl PassiveClosure {
+    /// Prepares the closure. Fails with `SingularNominal` if a determinant is zero at the nominal pose.
     pub(crate) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -77,6 +84,7 @@ impl PassiveClosure {
             may_be_undefined: checks::may_be_undefined(mechanism),
             passes: &PASSES,
         };
+        // A small determinant is singular only if its digits are significant.
         for id in &equations.projection.determinants {
             let limit = SINGULAR * magnitude::nominal_magnitude(graph, mechanism, &[*id]);
             let is_small = |value: f64| value.abs() <= limit;
@@ -94,18 +102,21 @@ impl PassiveClosure {
         let Some(plan) = closing.plan.clone() else {
             return Ok(closing);
         };
+        // Steps in order: each makes its unknowns known for the following ones.
         for step in &plan.steps {
-            // Earlier steps' unknowns are known by now; their closed form goes into this step's expressions.
+            // The closed form of earlier unknowns is put into this step's expressions.
             let mut roots: Vec<ExprId> =
                 step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
             roots.extend(step.solved.values.iter().map(|(_, value)| *value));
             roots.extend(step.solved.root.iter().map(|root| root.radicand));
+            // Angles, then values, then the radicand, in this order.
             let closed = closing.close_position(graph, &roots);
             let n_angles = step.solved.angles.len();
             let first = closing.solved.len();
             closing
                 .solved
                 .extend(closed[..2 * n_angles].chunks(2).map(|cs| [cs[0], cs[1]]));
+            // Values of the step: angles become definitions, lengths replacements.
             for ((coordinate, _), value) in step.solved.values.iter().zip(&closed[2 * n_angles..]) {
                 let atom = Atom::Coordinate(*coordinate);
                 if mechanism.coordinates[*coordinate].motion.is_angle() {
@@ -118,18 +129,22 @@ impl PassiveClosure {
             closing
                 .reachable
                 .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
+            // The sums of angles that the step solves for.
             let angles: Vec<AtomAngleSum> = step
                 .solved
                 .angles
                 .iter()
                 .map(|(angle, _)| angle.clone())
                 .collect();
+            // Single angles from the solved sums of this step.
             closing.resolve_angles(step.unknown.clone(), &angles, first);
             for relation in &step.solved.relations {
                 let parts = closing.resolve_sum(&relation.sum, relation.pi12);
                 closing.angle_of.insert(relation.coordinate, parts);
             }
         }
+        // Passive angles: known sums are replaced directly, others are computed from sine and cosine if their value is
+        // read.
         for p in &equations.projection.loops.passive {
             if closing.angle_of.contains_key(p) {
                 let parts = &closing.angle_of[p];
@@ -139,12 +154,13 @@ impl PassiveClosure {
                     closing.position.insert(atom, value);
                     continue;
                 }
-                // A follower has its value; its turn alone would not say how often it went round.
+                // A coupled coordinate has its value already; sine and cosine would lose whole turns.
                 let atom = Atom::Coordinate(*p);
                 if closing.definitions.iter().any(|d| d.atom == atom) {
                     continue;
                 }
                 let [cosine, sine] = closing.cos_sin(graph, &AtomAngleSum::new([(atom, 1)]));
+                // The angle is computed relative to the quarter turn of the nominal pose.
                 let quarters = quarter_turns(mechanism.coordinates[*p].nominal);
                 let back = graph.cos_sin(&AtomAngleSum::NONE, -6 * quarters);
                 let [cosine, sine] = rotate_vector(graph, [back.0, back.1], [cosine, sine]);
@@ -161,7 +177,7 @@ impl PassiveClosure {
         Ok(closing)
     }
 
-    /// Guards further determinants.
+    /// Adds determinants to the guards, if they are new.
     pub(crate) fn add_guards(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
@@ -173,22 +189,24 @@ impl PassiveClosure {
         }
     }
 
-    /// Uses some passes of lowering only, to see what the others do.
+    /// Uses only the given passes of lowering, to count what each of them saves.
     pub(crate) fn limit_passes(&mut self, passes: &'static [LoweringPass]) {
         self.passes = passes;
     }
 
-    /// How every loop is solved in closed form, if all of them are.
+    /// The closed-form solution of all loops, if there is one.
     pub(crate) fn plan(&self) -> Option<&LoopPlan> {
         self.plan.as_ref()
     }
 
-    /// Writes every unknown angle as a sum of solved angles and known coordinates.
+    /// Writes every unknown angle as a sum of solved sums and known coordinates. `first` is the index of the first of
+    /// `angles` among the solved sums.
     fn resolve_angles(&mut self, mut unknown: Vec<usize>, angles: &[AtomAngleSum], first: usize) {
         let mut progress = true;
         while progress {
             progress = false;
             for (k, angle) in angles.iter().enumerate() {
+                // A solved sum with a single unknown determines it.
                 let inside: Vec<_> = angle
                     .terms()
                     .iter()
@@ -217,7 +235,7 @@ impl PassiveClosure {
         }
     }
 
-    /// A sum of angles with its passive coordinates put by what they are made of.
+    /// A sum of angles in which passive coordinates are replaced by their own sums.
     fn resolve_sum(&self, sum: &AtomAngleSum, pi12: i32) -> ResolvedAngle {
         let mut known = AtomAngleSum::NONE;
         let mut pi12 = pi12;
@@ -242,11 +260,12 @@ impl PassiveClosure {
         }
     }
 
-    /// Cosine and sine of a sum of angles, by the addition theorem.
+    /// Cosine and sine of a sum of angles, by the addition theorems.
     fn cos_sin(&self, graph: &mut Graph, sum: &AtomAngleSum) -> [ExprId; 2] {
         let parts = self.resolve_sum(sum, 0);
         let (c, s) = graph.cos_sin(&parts.known, parts.pi12);
         let mut total = [c, s];
+        // Solved sums are added one after the other.
         for (piece, n) in parts.solved {
             let turned = multiply_angle(graph, self.solved[piece], n.into());
             total = rotate_vector(graph, total, turned);
@@ -254,9 +273,10 @@ impl PassiveClosure {
         total
     }
 
-    /// Replaces passive positions by their closed form.
+    /// Replaces passive positions in expressions by their closed form.
     fn close_position(&self, graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
         let mut replacements = self.position.clone();
+        // Sines and cosines that contain passive angles.
         let trigonometric: Vec<(Node, AtomAngleSum)> = graph
             .nodes_of(roots)
             .filter_map(|node| match node {
@@ -281,9 +301,10 @@ impl PassiveClosure {
         graph.substitute(roots, &replacements)
     }
 
-    /// The definitions of atoms that some expressions need, directly or by way of other definitions.
+    /// The definitions of atoms that some expressions need, directly or through other definitions.
     fn definitions(&self, graph: &Graph, roots: &[ExprId]) -> Vec<AtomDefinition> {
         let mut used = graph.atoms(roots);
+        // Guards may need definitions too.
         used.extend(graph.atoms(&self.reachable));
         let (mut found, mut left): (Vec<AtomDefinition>, _) =
             (Vec::new(), self.definitions.clone());
@@ -301,7 +322,7 @@ impl PassiveClosure {
         }
     }
 
-    /// Closes some expressions over the active coordinates and lowers them.
+    /// Closes some expressions over the active coordinates and lowers them to a program.
     pub(crate) fn program(
         &self,
         graph: &mut Graph,
@@ -311,8 +332,8 @@ impl PassiveClosure {
         self.program_at(graph, equations, outputs, &BTreeMap::new())
     }
 
-    /// What a program of some expressions costs. Expressions of an open chain are counted as they stand, since closing
-    /// does nothing to them and lowering finds little; that saves nearly all of the time.
+    /// Cost of a program of some expressions, in additions. In an open chain the expressions themselves are counted:
+    /// closing changes nothing and lowering saves little, and that takes a small part of the time.
     pub(crate) fn program_cost(
         &self,
         graph: &mut Graph,
@@ -327,7 +348,7 @@ impl PassiveClosure {
         }
     }
 
-    /// The same where some rates and accelerations are known, such as none at all.
+    /// The same with some rates and accelerations replaced by `known` expressions, such as zero.
     pub(crate) fn program_at(
         &self,
         graph: &mut Graph,
@@ -336,6 +357,7 @@ impl PassiveClosure {
         known: &BTreeMap<ExprId, ExprId>,
     ) -> StraightLineProgram {
         let projection = &equations.projection;
+        // Rates first, because accelerations depend on them.
         let passive_rates = graph.substitute(&projection.passive_rates, known);
         let mut rates: BTreeMap<ExprId, ExprId> = projection
             .loops
@@ -350,6 +372,7 @@ impl PassiveClosure {
         for (p, acceleration) in projection.loops.passive.iter().zip(accelerations) {
             motion.insert(graph.atom(Atom::Acceleration(*p)), acceleration);
         }
+        // Outputs and determinants are closed together, so that they share expressions.
         let mut roots = graph.substitute(outputs, &motion);
         let n = roots.len();
         roots.extend(self.regular.iter().map(|(id, _)| *id));
@@ -361,7 +384,7 @@ impl PassiveClosure {
             .copied()
             .zip(&self.regular)
             .filter_map(|(closed, (_, size))| {
-                // A number that is not zero never is, and a rational factor need not be multiplied just to be compared.
+                // A constant that is not zero needs no guard, and a rational factor is moved to the size.
                 let (base, factor) = graph.split_factor(closed);
                 let varies = base != Graph::ONE || factor.is_zero();
                 varies.then(|| (base, graph.scale(*size, &factor.abs().recip())))

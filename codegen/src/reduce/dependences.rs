@@ -1,4 +1,4 @@
-//! Which columns depend on which, and the proof that the dependences hold.
+//! Dependences between columns at random points of the field, and the confirmation of a reduction at fresh points.
 
 use modelmill_algebra::field::{FieldElement, MODULUS, PRIMES, RandomStream};
 use modelmill_spec::Mechanism;
@@ -9,11 +9,12 @@ use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::tree::expressions::ParameterMonomial;
 
-/// With how many sets of constants the result is shown, and at how many points of motion for each.
+/// Number of sets of constants with which a result is confirmed.
 const CONFIRMED_WITH: usize = 4;
+/// Number of points of motion for each of them.
 const CONFIRMED_AT: usize = 2;
 
-/// Which columns depend on which, as seen for one random set of constants; columns by position among the effective ones.
+/// Which columns depend on which, for one random set of constants. Columns are numbered among those with an effect.
 pub(super) struct DependenceStructure {
     /// Columns that are not identically zero.
     pub(super) shown: Vec<usize>,
@@ -23,13 +24,14 @@ pub(super) struct DependenceStructure {
     pub(super) dependent: Vec<usize>,
     /// Pairs of a dependent and a retained column with a factor that does not vanish.
     pub(super) wanted: Vec<(usize, usize)>,
-    /// The same dependences, also between columns that are closer together.
+    /// The same dependences, also between columns that depend on each other more directly.
     pub(super) relations: Vec<ColumnRelation>,
-    /// At how many points of motion everything was seen.
+    /// Number of points of motion that were sampled.
     pub(super) n_points: usize,
 }
 
 impl DependenceStructure {
+    /// Samples the regressor and eliminates; columns that come first in `order` are retained first.
     pub(super) fn find_dependences(
         regressor: &SampledRegressor,
         order: &[usize],
@@ -41,6 +43,7 @@ impl DependenceStructure {
         let shown: Vec<usize> = (0..n).filter(|k| echelon.has_nonzero_value(*k)).collect();
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
+        // Columns without a pivot depend on the retained ones.
         let dependent: Vec<usize> = shown
             .iter()
             .copied()
@@ -49,6 +52,7 @@ impl DependenceStructure {
         let wanted = dependent
             .iter()
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
+            // Factors that vanish at random constants vanish always.
             .filter(|(j, p)| {
                 echelon
                     .entry(*p, *j)
@@ -69,6 +73,10 @@ impl DependenceStructure {
         })
     }
 
+    /// The reduction from the factors of all dependent columns; `name` returns the product of a column.
+    ///
+    /// # Errors
+    /// [`DeriveError::FactorNotRecovered`] if a factor is `None`.
     pub(super) fn reduction(
         &self,
         mechanism: &Mechanism,
@@ -82,6 +90,7 @@ impl DependenceStructure {
                 .position(|x| *x == k)
                 .expect("a column with an effect is shown")
         };
+        // One line per dependent column, filled below.
         let mut dependencies: Vec<ColumnDependency> = self
             .dependent
             .iter()
@@ -100,6 +109,7 @@ impl DependenceStructure {
                     product: name(j).text(mechanism),
                     retained: name(p).text(mechanism),
                 })?;
+                // A factor belongs to a retained column, or to another dependent one.
                 match self.pivots.iter().position(|x| *x == p) {
                     Some(retained) => dependencies[line].equals.push((retained, factor)),
                     None => dependencies[line].via.push((position(p), factor)),
@@ -125,17 +135,21 @@ impl DependenceStructure {
 }
 
 impl BaseReduction {
-    /// Shows `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
+    /// Confirms `H p_g = H_min p_min` for random parameters at fresh points of motion with fresh constants.
+    ///
+    /// # Errors
+    /// [`DeriveError::NotConfirmed`] if it is not true, [`DeriveError::RankChanged`] if a factor has no value there.
     pub(super) fn confirm_reduction(
         &self,
         regressor: &SampledRegressor,
         shown: &[usize],
         stream: &mut RandomStream,
     ) -> Result<(), DeriveError> {
-        /// A field that had no part in finding it.
+        /// A field that was not used to find the reduction.
         const FRESH: u64 = PRIMES[PRIMES.len() - 1];
         for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
+            // Random parameters, and the base parameters that eq. (7) gives for them.
             let parameters: Vec<FieldElement<FRESH>> = self
                 .products
                 .iter()
@@ -151,6 +165,7 @@ impl BaseReduction {
                     base[k] = base[k] + factor * parameters[line.product];
                 }
             }
+            // Both sides at fresh points of motion.
             for _ in 0..CONFIRMED_AT {
                 for row in regressor.draw_rows(&constants, stream)? {
                     let sum = |terms: &mut dyn Iterator<Item = (usize, FieldElement<FRESH>)>| {

@@ -1,26 +1,26 @@
-//! The factors of eq. (6) as rational functions of the constants: reconstructed from points of motion for relations that
-//! are as simple as can be found, put together from there.
+//! The factors of eq. (6) as rational functions of the constants. Simple relations between columns are reconstructed
+//! from points of motion, and the factors are combined from these.
 
 use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use super::dependences::DependenceStructure;
 use super::oracle::{ConstantOccurrence, OperationBudget, PrimeFieldOracle};
 use super::reconstruct::{self, DependenceSurvey};
-use super::relations::{self, ColumnRelation, DependentColumn, SolvedRelations};
+use super::relations::{self, ColumnRelation, DependentColumn, RelationRows, SolvedRelations};
 use super::sample::SampledRegressor;
 use crate::DeriveError;
 use crate::expr::FieldPoint;
 
-/// Operations of the field that factors may take: a minute or so.
+/// Largest number of field operations for the factors, which takes about a minute.
 pub(super) const MOST_OPERATIONS: u64 = 20_000_000_000;
 
-/// Relations to retained columns that are not longer than this are as good as near ones.
+/// Relations to retained columns that are not longer than this are used directly.
 const FEW: usize = 12;
 
-/// Terms of all factors on retained columns beyond which nobody reads them: then columns are written by near ones.
+/// Above this number of terms in all factors on retained columns, columns are written by neighbouring columns.
 const MOST_TERMS: usize = 5_000;
 
-/// The dependent columns by others; factors that resist are `None`.
+/// The dependent columns as combinations of others. Factors that cannot be reconstructed are `None`.
 pub(super) fn find_factors(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
@@ -32,6 +32,7 @@ pub(super) fn find_factors(
     if dependences.wanted.is_empty() {
         return Ok(Vec::new());
     }
+    // Relations to retained columns only.
     let direct: Vec<ColumnRelation> = (dependences.relations.iter())
         .filter(|relation| relation.has_retained_only())
         .cloned()
@@ -49,13 +50,13 @@ pub(super) fn find_factors(
         )
     };
     match by(&dependences.relations) {
-        // Which columns are near may depend on the constants, as with roots that take either sign.
+        // Which columns are near may depend on the constants, for example with roots of either sign.
         Err(DeriveError::RankChanged) if direct.len() < dependences.relations.len() => by(&direct),
         found => found,
     }
 }
 
-/// How many factors on retained columns have a sum in a denominator.
+/// Number of factors on retained columns with a sum in a denominator.
 pub(super) fn n_quotients(
     dependences: &DependenceStructure,
     regressor: &SampledRegressor,
@@ -67,6 +68,7 @@ pub(super) fn n_quotients(
         .iter()
         .filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
+    // Only relations to retained columns have factors on retained columns.
     let mut oracle = MotionFactorOracle {
         regressor,
         dependences,
@@ -77,7 +79,7 @@ pub(super) fn n_quotients(
     reconstruct::n_quotients(&mut oracle, variables, stream)
 }
 
-/// The dependent columns by some relations, those to retained columns among them.
+/// The dependent columns from given relations, which include those to retained columns.
 fn factors_by_relations(
     all: &[ColumnRelation],
     dependences: &DependenceStructure,
@@ -87,6 +89,7 @@ fn factors_by_relations(
     budget: &mut OperationBudget,
     stream: &mut RandomStream,
 ) -> Result<Vec<DependentColumn>, DeriveError> {
+    // Reconstructs the factors of some relations; those to retained columns are needed for all others.
     let mut found = |chosen: Vec<ColumnRelation>, stream: &mut RandomStream| {
         let mut oracle = MotionFactorOracle {
             regressor,
@@ -96,6 +99,7 @@ fn factors_by_relations(
             budget: &mut *budget,
         };
         let mut survey = DependenceSurvey::new(&mut oracle, variables, roots, stream)?;
+        // A relation to retained columns is needed by all that use its column.
         let wanted: Vec<(usize, bool)> = (chosen.iter())
             .flat_map(|r| std::iter::repeat_n(r.has_retained_only(), r.len()))
             .enumerate()
@@ -103,12 +107,12 @@ fn factors_by_relations(
         let factors = survey.reconstruct_functions(&mut oracle, &wanted, stream)?;
         Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
-    // Near relations come right behind those to retained columns.
+    // The relation to near columns comes directly after the one to retained columns.
     let nearest =
         (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
-    // What is near need not be simple: where the first joints of an arm do not feel all of a link, relations between links
-    // divide by sines of twists, and those to retained columns do not.
+    // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
+    // between links divide by sines of twists, and relations to retained columns do not.
     let is_long = related.is_complete() && related.n_terms() > MOST_TERMS;
     let unwieldy = related.unwieldy_columns();
     let direct: Vec<ColumnRelation> = (all.iter())
@@ -119,10 +123,12 @@ fn factors_by_relations(
     if !direct.is_empty() && !related.has_unknown_factor() {
         related.replace(found(direct, stream)?);
     }
+    // Too many terms: columns are written by near columns.
     if is_long {
         return Ok(related.into_dependent_columns());
     }
     let mut written = related.expanded_factors(&dependences.wanted, roots);
+    // Factors that cannot be multiplied out are reconstructed from the combined relations.
     let missing: Vec<usize> = (0..written.len())
         .filter(|k| written[*k].is_none())
         .collect();
@@ -138,6 +144,7 @@ fn factors_by_relations(
             written[k] = function;
         }
     }
+    // Every factor on a retained column becomes a line of its own.
     let pairs = dependences.wanted.iter().zip(written);
     let line = |((column, p), factor): (&(usize, usize), _)| DependentColumn {
         column: *column,
@@ -146,12 +153,17 @@ fn factors_by_relations(
     Ok(pairs.map(line).collect())
 }
 
-/// The factors of relations, from points of motion.
+/// Evaluates the factors of relations from points of motion.
 struct MotionFactorOracle<'a> {
+    /// The regressor's columns at random points.
     regressor: &'a SampledRegressor,
+    /// Dependences that the columns must show again.
     dependences: &'a DependenceStructure,
+    /// Relations whose factors are evaluated.
     relations: &'a [ColumnRelation],
+    /// Random numbers for the points.
     sampling: RandomStream,
+    /// Remaining field operations.
     budget: &'a mut OperationBudget,
 }
 
@@ -167,16 +179,27 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         &mut self,
         constants: &FieldPoint<FieldElement<P>>,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // Two ways: eliminate all columns at once, or each relation from its own columns. The cheaper one is used.
         let rank = self.dependences.pivots.len();
         let at_once = rank * rank * self.regressor.n_columns;
         let one_by_one: usize = self.relations.iter().map(|r| (r.len() + 1).pow(3)).sum();
         self.charge(at_once.min(one_by_one))?;
+        // One relation at a time: its columns at as many points as the survey of dependences used.
         if one_by_one < at_once {
-            let mut rows = Vec::new();
+            // Few points are enough for relations between few columns.
+            let mut open: Vec<RelationRows<P>> =
+                self.relations.iter().map(RelationRows::new).collect();
             for _ in 0..self.dependences.n_points {
-                rows.extend(self.regressor.draw_rows(constants, &mut self.sampling)?);
+                if open.iter().all(RelationRows::is_confirmed) {
+                    break;
+                }
+                let rows = self.regressor.draw_rows(constants, &mut self.sampling)?;
+                for relation in &mut open {
+                    relation.take(&rows);
+                }
             }
-            return relations::values_from_rows(self.relations, &rows);
+            let values = open.iter().map(RelationRows::values);
+            return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());
         }
         let (echelon, _) = self.regressor.reduced_rows(
             constants,
@@ -192,12 +215,15 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
     }
 }
 
-/// Wanted factors from relations, all of which must be known: much cheaper than from points of motion.
+/// Evaluates wanted factors from relations whose factors are all known; much cheaper than from points of motion.
 struct RelationFactorOracle<'a> {
+    /// The relations.
     related: &'a SolvedRelations,
+    /// Source of constants at which all functions exist.
     regressor: &'a SampledRegressor,
-    /// Which ones.
+    /// Pairs of a dependent and a retained column.
     wanted: Vec<(usize, usize)>,
+    /// Remaining field operations.
     budget: &'a mut OperationBudget,
 }
 
@@ -213,6 +239,7 @@ impl PrimeFieldOracle for RelationFactorOracle<'_> {
         &mut self,
         constants: &FieldPoint<FieldElement<P>>,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        // An estimate: a thousand operations per factor.
         self.charge(1000 * self.wanted.len())?;
         let values = self.related.values(&self.wanted, constants);
         values.ok_or(DeriveError::RankChanged)

@@ -1,4 +1,4 @@
-//! The coefficients of a rational function whose degrees are known: an ansatz, solved in one field after the other.
+//! The coefficients of a rational function with known degrees: an ansatz that is solved in one field after the other.
 
 use std::collections::BTreeMap;
 
@@ -10,38 +10,46 @@ use super::oracle::{ConstantOccurrence, PrimeFieldOracle};
 use super::rational_function::{
     FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial, monomial_value,
 };
-use super::support::{PartialSamples, support};
+use super::support::{PartialSamples, nonzero_monomials};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
-/// What is known about one function before its coefficients are.
+/// What is known about a function before its coefficients are computed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct FunctionShape {
-    /// Degrees of numerator and denominator in each constant that matters; in half the tangent for angles.
+    /// Degrees of numerator and denominator in each constant on which it depends; for angles in the tangent of half the
+    /// angle.
     pub(super) degrees: BTreeMap<ConstantOccurrence, (usize, usize)>,
-    /// Degrees in all lengths together.
+    /// Degrees of numerator and denominator in all lengths together.
     pub(super) total: Option<(usize, usize)>,
-    /// Some degree could not be found.
+    /// Whether some degree could not be found.
     pub(super) lost: bool,
 }
 
-/// Random points of one field with the values of all functions, shared between the fits.
+/// Random points of one field with the values of all functions, which all fits share.
 struct FieldSamples<const P: u64> {
+    /// Constants, and the values of all functions for them.
     points: Vec<(FieldPoint<FieldElement<P>>, Vec<FieldElement<P>>)>,
 }
 
-/// An ansatz for one function.
+/// An ansatz for one function: monomials with unknown coefficients.
 struct RationalAnsatz {
+    /// Index of the function.
     function: usize,
+    /// Monomials of the numerator.
     numerator: Vec<PowerProduct>,
+    /// Monomials of the denominator.
     denominator: Vec<PowerProduct>,
+    /// Number of points, which is the number of equations.
     n_points: usize,
 }
 
-/// A field in which an ansatz can be solved; solutions are residues, scaled so that the last coefficient of the
-/// denominator is 1. `None` where a root or an inverse is missing.
+/// A field in which an ansatz can be solved. Solutions are residues, scaled so that the last coefficient of the
+/// denominator that is not zero is 1. `None` if a root or an inverse does not exist.
 trait AnsatzSolver<O> {
+    /// The prime of the field.
     fn modulus(&self) -> u64;
+    /// All independent solutions, as coefficients of the numerator, then of the denominator.
     fn solutions(
         &mut self,
         ansatz: &RationalAnsatz,
@@ -61,12 +69,14 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
         oracle: &mut O,
         stream: &mut RandomStream,
     ) -> Result<Option<Vec<Vec<u64>>>, DeriveError> {
+        // Points are drawn as needed and kept for other functions.
         while self.points.len() < ansatz.n_points {
             let point = oracle.constants(stream)?;
             let values = oracle.values(&point)?;
             self.points.push((point, values));
         }
         let n_top = ansatz.numerator.len();
+        // One equation per point: numerator - value * denominator = 0.
         let rows: Option<Vec<Vec<FieldElement<P>>>> = self.points[..ansatz.n_points]
             .iter()
             .map(|(point, values)| {
@@ -86,6 +96,7 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
         Ok(Some(
             solutions
                 .into_iter()
+                // The overall scale of a solution is chosen here.
                 .filter_map(|x| {
                     let last = x[n_top..]
                         .iter()
@@ -99,10 +110,11 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
     }
 }
 
-/// All fields, with what was sampled in each.
+/// All fields, with the points that were sampled in each.
 pub(super) struct PrimeFields<O> {
+    /// One solver per prime, in the order in which they are used.
     solvers: Vec<Box<dyn AnsatzSolver<O>>>,
-    /// Points of the first field at which only some constants are drawn anew.
+    /// Points of the first field at which only some constants are drawn again.
     partial: PartialSamples,
 }
 
@@ -128,13 +140,15 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
         }
     }
 
-    /// Coefficients that solve an ansatz, over the rationals.
+    /// Rational coefficients that solve an ansatz; `None` if there is no solution, or none with short enough
+    /// coefficients.
     fn solve_ansatz(
         &mut self,
         ansatz: &RationalAnsatz,
         oracle: &mut O,
         stream: &mut RandomStream,
     ) -> Result<Option<Vec<Rational>>, DeriveError> {
+        // Residues of every coefficient in the fields so far.
         let mut residues: Vec<Vec<(u64, u64)>> = Vec::new();
         for field in &mut self.solvers {
             let modulus = field.modulus();
@@ -148,6 +162,7 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
             for (all, residue) in residues.iter_mut().zip(solution) {
                 all.push((modulus, residue));
             }
+            // Chinese remainders: each further field allows longer coefficients.
             let lifted: Option<Vec<Rational>> =
                 residues.iter().map(|r| reconstruct_rational(r)).collect();
             if lifted.is_some() {
@@ -159,21 +174,22 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
 }
 
 impl FunctionShape {
-    /// Coefficients of numerator and denominator from `numerator - value * denominator = 0` at many points.
+    /// The function from `numerator - value * denominator = 0` at many points; `None` if no ansatz fits.
     pub(super) fn fit_function<O: PrimeFieldOracle>(
         &self,
         fields: &mut PrimeFields<O>,
-        partial: &mut PartialSamples,
         oracle: &mut O,
         function: usize,
         roots: &[i64],
         stream: &mut RandomStream,
     ) -> Result<Option<RationalFunction>, DeriveError> {
+        // Largest number of coefficients of one linear system.
         const MOST_UNKNOWNS: usize = 400;
         if self.lost {
             return Ok(None);
         }
-        // A quotient of degree 2k in half the tangent is a quotient of trigonometric polynomials of degree k.
+        // A quotient of degree 2k in the tangent of half an angle is a quotient of trigonometric polynomials of degree
+        // k.
         let angle_degree = self
             .degrees
             .iter()
@@ -184,6 +200,7 @@ impl FunctionShape {
         if roots.len() >= MOST_UNKNOWNS.ilog2() as usize {
             return Ok(None);
         }
+        // Every monomial may be multiplied by each product of different roots.
         let root_powers = root_products(roots);
         let with_roots = |monomials: Vec<PowerProduct>| -> Vec<PowerProduct> {
             monomials
@@ -198,8 +215,8 @@ impl FunctionShape {
                 })
                 .collect()
         };
-        // The share of the angles in the denominator is raised until a function fits; lengths are known already.
-        // Roots in the denominator are the last resort: most often they can be moved to the numerator.
+        // The degree in the angles of the denominator is raised until an ansatz fits; degrees in lengths are known.
+        // Roots in the denominator are tried last: most often they can be moved to the numerator.
         let mut attempts: Vec<(usize, bool)> = (0..=angle_degree).map(|d| (d, false)).collect();
         if !roots.is_empty() {
             attempts.extend((0..=angle_degree).map(|d| (d, true)));
@@ -211,8 +228,8 @@ impl FunctionShape {
                 denominator = with_roots(denominator);
             }
             if numerator.len() + denominator.len() > MOST_UNKNOWNS {
-                // Most of so many have no coefficient. Roots have a sign of their own at every point, so that no
-                // place stays the same for them.
+                // Most monomials have coefficient zero then, so the others are determined first. With roots this is not
+                // possible: their signs differ at every point, so they cannot be kept fixed.
                 if !roots.is_empty() {
                     continue;
                 }
@@ -231,7 +248,7 @@ impl FunctionShape {
                 [numerator, denominator] = found;
             }
             let unknowns = numerator.len() + denominator.len();
-            // Roots take either sign by chance; every combination of signs must come up.
+            // Roots have random signs at each point; every combination of signs must occur.
             let n_points = unknowns + 4 + 20 * (root_powers.len() - 1);
             let ansatz = RationalAnsatz {
                 function,
@@ -240,6 +257,7 @@ impl FunctionShape {
                 n_points,
             };
             if let Some(coefficients) = fields.solve_ansatz(&ansatz, oracle, stream)? {
+                // Monomials with coefficient zero are dropped.
                 let (top, bottom) = coefficients.split_at(ansatz.numerator.len());
                 let polynomial =
                     |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
@@ -259,13 +277,16 @@ impl FunctionShape {
         Ok(None)
     }
 
-    /// Monomials that the numerator or denominator may have.
+    /// All monomials that the degrees allow in the numerator or denominator. `angle_bound` limits the degree in cosine
+    /// and sine.
     fn monomials(&self, numerator: bool, angle_bound: usize) -> Vec<PowerProduct> {
         let pick = |(n, d): (usize, usize)| if numerator { n } else { d };
         let mut monomials: Vec<(PowerProduct, usize)> = vec![(PowerProduct::new(), 0)];
+        // The list is extended by one constant at a time.
         for ((index, in_angle), degrees) in &self.degrees {
             let mut extended = Vec::new();
             if *in_angle {
+                // sin^2 = 1 - cos^2, so the sine occurs at most once.
                 let bound = angle_bound.min(degrees.0.max(degrees.1).div_ceil(2));
                 for (powers, total) in &monomials {
                     for cosine in 0..=bound {
@@ -278,6 +299,7 @@ impl FunctionShape {
                     }
                 }
             } else {
+                // The total degree in lengths limits the products of powers.
                 let bound = self.total.map_or(usize::MAX, pick);
                 for (powers, total) in &monomials {
                     for exponent in 0..=pick(*degrees) {
@@ -299,13 +321,14 @@ impl FunctionShape {
     }
 }
 
+/// Appends a power unless its exponent is zero.
 fn push_power(powers: &mut PowerProduct, variable: FactorVariable, exponent: usize) {
     if exponent > 0 {
         powers.push((variable, u32::try_from(exponent).expect("a small degree")));
     }
 }
 
-/// 1 and every product of different roots.
+/// 1, and all products of different roots.
 fn root_products(roots: &[i64]) -> Vec<PowerProduct> {
     roots
         .iter()

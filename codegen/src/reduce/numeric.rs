@@ -1,9 +1,10 @@
-//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's values, with
-//! so many digits that what is dependent shows beside what is only small.
+//! The numeric reduction, for loops that cannot be sampled exactly: the rank test of eq. (9) on the model file's
+//! values, with so many digits that dependent columns can be distinguished from small ones.
 //!
-//! Columns of a mechanism with one freedom are functions of one coordinate, and smooth: on a short path they differ by less than
-//! machine numbers resolve. So states come from a walk along the whole motion, have some 130 digits, and are on all loops.
-//! The factors hold for the file's values alone; results say so, with what they leave at further states.
+//! Columns of a mechanism with one degree of freedom are smooth functions of one coordinate. On a short path they
+//! differ by less than double precision resolves. So states come from a walk along the complete motion, have some 130
+//! digits, and close all loops. The factors are valid for the file's values alone; results state this, with the
+//! residual at further states.
 //!
 //! Decision: with machine numbers the singular values of such columns fade into rounding without a gap; a Bricard
 //! linkage had 18, 22 or 26 base parameters, depending on the path. With 130 digits a dependent column leaves
@@ -28,24 +29,29 @@ use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::regressor::projection::LoopProjection;
 use crate::tree::expressions::ParameterMonomial;
 
-/// A column counts as dependent where others leave less than this of it, relative to its size; and as none where it is smaller
-/// than this, relative to the largest. So does a column at a pose in machine numbers.
+/// A column counts as dependent if its residual is below this share of its size, and as zero if it is below this share
+/// of the largest column. The second limit is also used for columns in double precision.
 const DEPENDENT: f64 = 1e-13;
-/// The same where the digits of the file leave loops open: as a multiple of what they leave, relative to the size of a loop.
+/// The same for loops with rounded lengths: as a multiple of their closure error, relative to the size of a loop.
 const PER_OFF: f64 = 100.0;
-/// What written factors may leave of a column at further states, relative to its terms.
+/// Largest residual of a column at further states with the factors as written, relative to its terms.
 const SHOWN: f64 = 1e-10;
-/// The same where loops are left open, as a multiple of that.
+/// The same for loops with rounded lengths, as a multiple of their closure error.
 const SHOWN_PER_OFF: f64 = 1000.0;
-/// How far poses lie from the nominal one, in rad or relative to the size of the loops, and how often that is halved
-/// where most of such poses cannot be reached.
+/// Distance of poses from the nominal one, in rad or relative to the size of the loops.
 pub(super) const REACH: f64 = 0.4;
+/// How often the distance is halved if most of such poses cannot be reached.
 const HALVINGS: u32 = 7;
 
-/// How often states are added where dependences do not hold further along the motion.
+/// How often states are added if dependences are not valid further along the motion.
 const ROUNDS: usize = 4;
 
-/// Reduces `columns[k][d]`, trying them in the given order.
+/// the exact reduction failed.
+/// Reduces `columns[k][d]` (product by drive), trying them as retained ones in the given order. `because` is the reason
+/// why
+///
+/// # Errors
+/// [`DeriveError::NotConfirmed`] if the factors are not valid at further states, or the errors of [`WalkSampler`].
 pub(super) fn reduce(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -56,13 +62,14 @@ pub(super) fn reduce(
     because: DeriveError,
 ) -> Result<BaseReduction, DeriveError> {
     let mut states = WalkSampler::new(graph, mechanism, projection, columns)?;
+    // More rows than columns, so that dependences cannot appear by chance.
     let n_rows = columns.len() + columns.len() / 4 + 20;
     let values: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let mut rows = states.next_rows(n_rows)?;
     for _ in 0..ROUNDS {
         let w = ObservationColumns::new(&rows, columns.len());
         let limit = DEPENDENT.max(PER_OFF * states.closure_error());
-        // Masses and their moments are compared at the length of the largest loop.
+        // Masses and their moments are compared at the size of the largest loop as the length.
         let sized = |k: usize| {
             let metres =
                 length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
@@ -73,14 +80,15 @@ pub(super) fn reduce(
         let is_effective = |k: &usize| sizes[*k] > limit * largest;
         let tried: Vec<usize> = order.iter().copied().filter(is_effective).collect();
         let base = NumericBase::new(&w, &tried, limit);
-        // What contributes less than is dropped is rounding.
+        // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
         let (mut found, effective) =
             numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
+        // The factors as written are checked at states that were not used.
         let further = states.next_rows(n_rows)?;
         let residual = ObservationColumns::new(&further, columns.len())
             .largest_residual(&found, &effective, &values);
-        // Terms that count as rounding are left out, each by itself.
+        // Terms below the rounding error are dropped, each by itself.
         let left_out = rounding * base.kept.len() as f64;
         if residual
             <= SHOWN
@@ -95,14 +103,14 @@ pub(super) fn reduce(
             };
             return Ok(found);
         }
-        // The path was too short for what is so small on it.
+        // The path was too short to distinguish small columns, so it is extended.
         rows.extend(further);
     }
     Err(DeriveError::NotConfirmed)
 }
 
-/// What was found as dependences of columns that have an effect, with the positions of these; factors as a person would write
-/// them.
+/// The reduction by the numeric dependences, and the positions of the columns with an effect. Factors are written in
+/// the form that a person would choose.
 fn numeric_reduction(
     mechanism: &Mechanism,
     candidates: &[ParameterMonomial],
@@ -119,6 +127,7 @@ fn numeric_reduction(
             .position(|x| *x == k)
             .expect("an effective column has a position")
     };
+    // Retained columns in the order of the products.
     let mut sorted = base.kept.clone();
     sorted.sort_unstable();
     let retained_at = |k: usize| {
@@ -131,6 +140,7 @@ fn numeric_reduction(
     let mut dependencies: Vec<ColumnDependency> = Vec::new();
     for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
         let factors = base.kept.iter().zip(base.column_factors(j));
+        // Factors whose contribution is below the rounding error are dropped.
         let mut equals: Vec<_> = factors
             .filter(|(k, f)| f.abs().to_f64() * w.norms[**k] > rounding * w.norms[j])
             .map(|(k, f)| {
@@ -164,13 +174,16 @@ fn numeric_reduction(
     (found, effective)
 }
 
-/// Columns of W.
+/// Columns of the observation matrix W of eq. (9).
 struct ObservationColumns {
+    /// One vector per column.
     values: Vec<Vec<BigFloat>>,
+    /// Euclidean norm of every column.
     norms: Vec<f64>,
 }
 
 impl ObservationColumns {
+    /// Collects the columns of some rows.
     fn new(rows: &[Vec<BigFloat>], n: usize) -> Self {
         let values: Vec<Vec<BigFloat>> = (0..n)
             .map(|k| rows.iter().map(|row| row[k].clone()).collect())
@@ -181,7 +194,7 @@ impl ObservationColumns {
         }
     }
 
-    /// The most that dependences leave of a column, relative to their terms.
+    /// The largest residual of a dependent column with given factors, relative to the sum of the norms of its terms.
     fn largest_residual(
         &self,
         found: &BaseReduction,
@@ -205,6 +218,7 @@ impl ObservationColumns {
     }
 }
 
+/// Euclidean norm, in double precision.
 fn norm(column: &[BigFloat]) -> f64 {
     column
         .iter()
@@ -213,6 +227,7 @@ fn norm(column: &[BigFloat]) -> f64 {
         .sqrt()
 }
 
+/// Scalar product with all digits.
 fn dot(a: &[BigFloat], b: &[BigFloat]) -> BigFloat {
     let products = a.iter().zip(b).map(|(a, b)| a * b);
     products.fold(BigFloat::zero(), |sum, term| &sum + &term)
@@ -225,20 +240,23 @@ fn add_multiple(column: &mut [BigFloat], factor: &BigFloat, other: &[BigFloat]) 
     }
 }
 
-/// Columns that are kept, and what all others are beside them.
+/// Retained columns, and all other columns as combinations of them.
 struct NumericBase {
-    /// In the order in which they were taken.
+    /// Retained columns, in the order in which they were selected.
     kept: Vec<usize>,
-    /// What the others leave of the kept column that is nearest to being dependent, and of the dropped one that is furthest.
+    /// Least relative residual of a retained column when it was selected.
     least_kept: f64,
+    /// Largest relative residual of a column that was not selected.
     most_dropped: f64,
-    /// Of each column the shares along what was left of each kept one when that was taken.
+    /// For each column its components along the residuals of the retained columns, in the order of their selection.
     shares: Vec<Vec<BigFloat>>,
 }
 
 impl NumericBase {
-    /// The first columns of which much is left beside those before, then those of which most is left, down to `limit`.
+    /// Selects columns by Gram-Schmidt: first the earliest columns with a large residual, then always the one with the
+    /// largest residual, down to `limit`.
     fn new(w: &ObservationColumns, tried: &[usize], limit: f64) -> Self {
+        // Relative residual above which the order decides, and not the size.
         const MUCH: f64 = 1e-3;
         let mut left = w.values.clone();
         let mut base = Self {
@@ -248,6 +266,7 @@ impl NumericBase {
             shares: vec![Vec::new(); w.values.len()],
         };
         loop {
+            // Relative residuals of all columns that are not selected.
             let open: Vec<(usize, f64)> = (tried.iter().copied())
                 .filter(|j| !base.kept.contains(j))
                 .map(|j| (j, norm(&left[j]) / w.norms[j]))
@@ -260,6 +279,7 @@ impl NumericBase {
             };
             base.least_kept = base.least_kept.min(size);
             base.kept.push(pivot);
+            // The selected residual is removed from all other columns.
             let direction = left[pivot].clone();
             let square = dot(&direction, &direction);
             for (j, _) in open.into_iter().filter(|(j, _)| *j != pivot) {
@@ -270,7 +290,7 @@ impl NumericBase {
         }
     }
 
-    /// A dropped column by the kept ones.
+    /// The factors of the retained columns in a dependent column, by back substitution.
     fn column_factors(&self, j: usize) -> Vec<BigFloat> {
         let mut factors = self.shares[j].clone();
         for m in (0..factors.len()).rev() {
@@ -283,8 +303,8 @@ impl NumericBase {
     }
 }
 
-/// Whether dependences that were found elsewhere fail on the model file's values around the nominal pose. Where no pose
-/// is found they do not.
+/// Whether dependences that were found exactly are not valid at the model file's values around the nominal pose. False
+/// if no pose is found.
 pub(super) fn is_contradicted(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -293,7 +313,7 @@ pub(super) fn is_contradicted(
     columns: &[Vec<ExprId>],
     found: &BaseReduction,
 ) -> bool {
-    /// Far above rounding in poses that are followed, far below what a wrong dependence makes.
+    /// Far above rounding errors at followed poses, and far below the residual of a wrong dependence.
     const WRONG: f64 = 1e-6;
     let Ok(w) = sample_observations(graph, mechanism, projection, columns, 0, REACH) else {
         return false;
@@ -324,7 +344,10 @@ pub(super) fn is_contradicted(
         })
 }
 
-/// W of eq. (9) at random states around the nominal pose, with some more rows than are wanted.
+/// The observation matrix W of eq. (9) at random states around the nominal pose, with a few more rows than `wanted`.
+///
+/// # Errors
+/// [`DeriveError::NoPointFound`] if too few poses can be reached.
 pub(super) fn sample_observations(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -351,6 +374,7 @@ pub(super) fn sample_observations(
     let (mut n_points, mut tries) = (0, 0);
     let mut reach = farthest;
     while n_points < wanted && tries < (HALVINGS as usize + 20) * wanted {
+        // Poses are drawn nearer to the nominal one while fewer than a quarter of them can be reached.
         if tries % wanted == 0 && n_points < tries / 4 {
             reach = (reach / 2.0).max(farthest / f64::from(1_u32 << HALVINGS));
         }
@@ -358,6 +382,7 @@ pub(super) fn sample_observations(
         let Some(q) = loops.random_pose(reach, &mut stream) else {
             continue;
         };
+        // Random rates and accelerations, scaled by the units of the coordinates.
         let mut moving = |most: f64| -> Vec<f64> {
             (0..n_coordinates)
                 .map(|i| most * loops.coordinate_unit(i) * uniform_symmetric(&mut stream))
@@ -379,6 +404,7 @@ pub(super) fn sample_observations(
                 Atom::Base(_) | Atom::Shared(_) => 0.0,
             }))
         };
+        // The loops determine the passive rates, then the passive accelerations.
         let Some(found) = evaluate(&rates, &qd, &qdd) else {
             continue;
         };
@@ -480,8 +506,8 @@ mod tests {
         }
     }
 
-    /// Loops that move against the count of their freedoms, and loops that fold: the number is beyond doubt, and factors are
-    /// constants of the file, without a decimal point.
+    /// Loops that move against the count of their freedoms, and loops that fold: the number is beyond doubt, and
+    /// factors are constants of the file, without a decimal point.
     #[test]
     fn overconstrained_and_symmetric_loops() {
         for (name, rank) in [
@@ -515,8 +541,8 @@ mod tests {
         }
     }
 
-    /// Lengths that a person has rounded close a loop with more equations than it needs only nearly: the base is that of the
-    /// loop that was meant, and what is left says how nearly.
+    /// With rounded lengths, a loop with more equations than needed closes only approximately. The base is that of the
+    /// exact loop, and the residual shows the rounding.
     #[test]
     fn rounded_lengths_keep_the_base() {
         let rounded = [(

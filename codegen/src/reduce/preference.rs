@@ -1,11 +1,11 @@
-//! In which order columns are tried as retained ones.
+//! The order in which columns are tried as retained ones.
 //!
 //! Products that the file names come first, all others in the order of eq. (5). Masses at a distance from their link's
-//! origin are a case of their own. Their columns are sums of the link's own ones with powers of lengths; written the other way
-//! round, the link's own ones take quotients by differences, which vanish where masses coincide. So there is a second order,
-//! in which such a product waits until its links' own products have been tried; it is taken where it saves such quotients.
+//! origin are a special case. Their columns are sums of the link's own columns with powers of lengths. The link's own
+//! columns, written by those, have quotients by differences of lengths, which vanish where masses coincide. So there is
+//! a second order, in which such a product comes after its links' own products. It is used if it avoids such quotients.
 //!
-//! Decision: both orders are tried along lines in the lengths. The order of the declaration stays unless the other
+//! Decision: both orders are tried along lines in the lengths. The order of the declaration is used unless the other
 //! one has fewer such quotients, because published bases are in the order of declaration.
 
 use std::collections::BTreeMap;
@@ -18,16 +18,17 @@ use crate::regressor::UnreducedEquations;
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
 
-/// Positions among the effective products, most preferred first.
+/// Two orders of the effective products, by position, most preferred first.
 pub(super) struct RetentionPreference {
     /// In the order of eq. (5).
     pub(super) declared: Vec<usize>,
-    /// Masses at a distance behind their links' own products.
+    /// Masses at a distance come after their links' own products.
     pub(super) own_first: Vec<usize>,
-    /// How many of them the file names.
+    /// Number of products that the file names; they come first in both orders.
     pub(super) n_named: usize,
 }
 
+/// The orders of preference for the products in `effective`.
 pub(super) fn retention_preference(
     graph: &Graph,
     mechanism: &Mechanism,
@@ -35,6 +36,7 @@ pub(super) fn retention_preference(
     effective: &[usize],
 ) -> RetentionPreference {
     let product = |k: usize| &equations.products[effective[k]];
+    // Products that the file names, as far as they have an effect, each once.
     let mut order: Vec<usize> = mechanism
         .retain
         .iter()
@@ -53,6 +55,7 @@ pub(super) fn retention_preference(
             named.push(k);
         }
     }
+    // The bodies of every product, and the last own product of every body.
     let carried: Vec<ProductBodies> = (0..effective.len())
         .map(|k| ProductBodies::new(graph, equations, product(k)))
         .collect();
@@ -66,6 +69,7 @@ pub(super) fn retention_preference(
         .filter(|k| !named.contains(k))
         .collect();
     let declared = [named.as_slice(), &others].concat();
+    // A distant product comes after the last own product of all its bodies.
     others.sort_by_key(|&k| {
         let one = &carried[k];
         let own = one.bodies.iter().filter_map(|body| last_own.get(body));
@@ -79,15 +83,16 @@ pub(super) fn retention_preference(
     }
 }
 
-/// On which bodies a product has inertia.
+/// The bodies on which a product has inertia.
 struct ProductBodies {
-    /// Links that move relative to their parents; what hangs on them without a joint is theirs.
+    /// Links that move relative to their parents; links without a joint belong to these.
     bodies: Vec<usize>,
-    /// Whether some of it depends on where the product sits on them.
+    /// Whether some of its inertia depends on its place on them.
     is_distant: bool,
 }
 
 impl ProductBodies {
+    /// Collects the bodies of all links with inertia of this product.
     fn new(graph: &Graph, equations: &UnreducedEquations, product: &ParameterMonomial) -> Self {
         let (mut bodies, mut is_distant) = (Vec::new(), false);
         for (link, inertia) in equations.inertia.link_inertias(product) {
@@ -115,7 +120,7 @@ fn body_of(tree: &KinematicTree, mut link: usize) -> (Option<usize>, bool) {
     }
 }
 
-/// Whether an inertia is that of a parameter about the origin: all that it holds is one number, but for signs.
+/// Whether an inertia is that of a parameter about the origin: all its elements are one number up to signs.
 fn is_direct_parameter(graph: &Graph, inertia: &InertiaFactors) -> bool {
     let mut sizes = Vec::new();
     for factor in inertia.iter().filter(|factor| **factor != Graph::ZERO) {
@@ -127,7 +132,7 @@ fn is_direct_parameter(graph: &Graph, inertia: &InertiaFactors) -> bool {
     sizes.windows(2).all(|pair| pair[0] == pair[1])
 }
 
-/// The size of a number.
+/// The magnitude of a number; `None` for other expressions.
 fn number_magnitude(graph: &Graph, id: ExprId) -> Option<Rational> {
     match graph.node(id) {
         Node::Rational(value) if value.is_negative() => Some(-value),

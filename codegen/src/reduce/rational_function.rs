@@ -1,4 +1,4 @@
-//! Rational functions of the model's constants: the factors a_k of eq. (6).
+//! Rational functions of the model's constants: the factors a_k of eq. (6), with their values and normal form.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use num_traits::{ToPrimitive, Zero};
 
 use crate::expr::{Atom, AtomAngleSum, ExprId, FieldPoint, Graph, Rational};
 
-/// What is left of a sum's terms, relative to their sizes, below which it is added up exactly.
+/// A sum below this share of its terms' magnitudes is added up exactly, because rounding would dominate it.
 const CANCELLED: f64 = 1e-3;
 
 /// What a factor may depend on: a constant, or the cosine or sine of a constant angle.
@@ -31,10 +31,12 @@ impl FactorVariable {
         self,
         point: &FieldPoint<FieldElement<P>>,
     ) -> Option<FieldElement<P>> {
+        // Sine and cosine of a constant are drawn independently of its value.
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
+            // Both signs of the root are possible; the point has chosen one.
             Self::Root(n) => crate::expr::EvaluationDomain::unary(
                 point,
                 crate::expr::Unary::Sqrt,
@@ -43,7 +45,7 @@ impl FactorVariable {
         }
     }
 
-    /// Its value for constants in floating point, by index.
+    /// Its value in double precision, for constants by index.
     fn value_f64(self, constants: &[f64]) -> f64 {
         match self {
             Self::Constant(i) => constants[i],
@@ -93,6 +95,7 @@ pub struct RationalFunction {
 impl RationalFunction {
     /// A number.
     pub fn constant(value: Rational) -> Self {
+        // Zero is the polynomial without terms.
         let one = BTreeMap::from([(PowerProduct::new(), Rational::ONE)]);
         let numerator = if value.is_zero() {
             BTreeMap::new()
@@ -112,19 +115,23 @@ impl RationalFunction {
     ) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
+            // A numerator without terms is zero.
             return Self::constant(Rational::ZERO);
         }
         (numerator, denominator) = (with_fewest_terms(numerator), with_fewest_terms(denominator));
+        // Powers of variables that all terms have are removed from both polynomials.
         let common = denominator
             .keys()
             .chain(numerator.keys())
             .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
+            // The smallest exponent of every variable.
             .reduce(|a, b| {
                 a.into_iter()
                     .filter_map(|(v, n)| b.get(&v).map(|m| (v, n.min(*m))))
                     .collect()
             })
             .unwrap_or_default();
+        // Divides every term by the common powers.
         let strip = |p: TrigonometricPolynomial| -> TrigonometricPolynomial {
             p.into_iter()
                 .map(|(powers, k)| {
@@ -138,6 +145,7 @@ impl RationalFunction {
                 .collect()
         };
         (numerator, denominator) = (strip(numerator), strip(denominator));
+        // The denominator gets coprime integer coefficients, the first of them positive.
         let mut content = denominator
             .values()
             .fold(Rational::ZERO, |c, k| c.content_with(k));
@@ -163,11 +171,12 @@ impl RationalFunction {
         self.numerator.is_empty()
     }
 
-    /// The number, if it is one.
+    /// The number that it equals; `None` if it depends on constants.
     pub fn as_constant(&self) -> Option<Rational> {
         if self.is_zero() {
             return Some(Rational::ZERO);
         }
+        // Both polynomials are numbers.
         match (
             self.numerator.len(),
             self.numerator.get(&PowerProduct::new()),
@@ -187,10 +196,11 @@ impl RationalFunction {
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
 
-    /// Its value for constants in floating point, by index. Sums whose terms all but cancel are added up exactly: quotients
-    /// of them are large, and would have lost their digits twice over.
+    /// Its value in double precision, for constants by index. Sums whose terms nearly cancel are added up exactly,
+    /// because quotients with them are large and would lose digits in both parts.
     pub fn value_f64(&self, constants: &[f64]) -> f64 {
         let evaluate = |p: &TrigonometricPolynomial| -> f64 {
+            // The sum and the sum of the magnitudes of its terms.
             let (mut sum, mut size) = (0.0, 0.0);
             for (powers, k) in p {
                 let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
@@ -201,6 +211,7 @@ impl RationalFunction {
                 sum += term;
                 size += term.abs();
             }
+            // Most digits have cancelled, so the terms are added as fractions.
             if sum.abs() < CANCELLED * size && size.is_finite() {
                 let exact: Vec<BigRational> = constants.iter().map(|c| from_f64(*c)).collect();
                 return polynomial_exact(p, &exact).to_f64().unwrap_or(f64::NAN);
@@ -210,7 +221,7 @@ impl RationalFunction {
         evaluate(&self.numerator) / evaluate(&self.denominator)
     }
 
-    /// Its exact value for exact constants, by index; sines, cosines and roots are those of floating point.
+    /// Its exact value for exact constants, by index; sines, cosines and roots are those of double precision.
     pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
         polynomial_exact(&self.numerator, constants)
             / polynomial_exact(&self.denominator, constants)
@@ -218,6 +229,7 @@ impl RationalFunction {
 
     /// As an expression of the graph.
     pub fn expression(&self, graph: &mut Graph) -> ExprId {
+        // Each polynomial as a sum of products of powers.
         let mut build = |p: &TrigonometricPolynomial| {
             let terms: Vec<_> = p
                 .iter()
@@ -241,17 +253,18 @@ impl RationalFunction {
     }
 }
 
-/// The number that a float is; zero for what is none.
+/// The exact value of a double; zero if it is not finite.
 fn from_f64(value: f64) -> BigRational {
     BigRational::from_float(value).unwrap_or_else(BigRational::zero)
 }
 
-/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of floating point.
+/// The exact value of a polynomial for exact constants; sines, cosines and roots are those of double precision.
 fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> BigRational {
     let mut sum = BigRational::zero();
     for (powers, k) in p {
         let mut product = k.to_big();
         for (v, n) in powers {
+            // Angles are rounded to double precision before their sine or cosine is computed.
             let angle = |i: &usize| constants[*i].to_f64().unwrap_or(f64::NAN);
             let value = match v {
                 FactorVariable::Constant(i) => constants[*i].clone(),
@@ -266,9 +279,10 @@ fn polynomial_exact(p: &TrigonometricPolynomial, constants: &[BigRational]) -> B
     sum
 }
 
-/// The same polynomial with even powers of a cosine as powers of the sine where that has fewer terms:
+/// The same polynomial with even powers of a cosine written as powers of the sine if that has fewer terms:
 /// `L^2 - L^2*cos(beta)^2` is `L^2*sin(beta)^2`.
 fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial {
+    // Angles whose cosines occur.
     let angles: BTreeSet<usize> = p
         .keys()
         .flatten()
@@ -280,6 +294,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
     for i in angles {
         let mut in_sines = TrigonometricPolynomial::new();
         for (powers, k) in &p {
+            // Exponent of a variable in this term.
             let power_of = |v: FactorVariable| {
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
@@ -301,6 +316,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
                 coefficient = &coefficient * &Rational::new(-i64::from(n - j), i64::from(j) + 1);
             }
         }
+        // Terms may have cancelled.
         in_sines.retain(|_, k| !k.is_zero());
         if in_sines.len() < p.len() {
             p = in_sines;
@@ -309,6 +325,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
     p
 }
 
+/// The value of a product of powers at a point of the field; `None` if a root does not exist there.
 pub(crate) fn monomial_value<const P: u64>(
     powers: &PowerProduct,
     point: &FieldPoint<FieldElement<P>>,
@@ -320,6 +337,7 @@ pub(crate) fn monomial_value<const P: u64>(
         })
 }
 
+/// The value of a polynomial at a point of the field; `None` if a root does not exist there.
 fn polynomial_value<const P: u64>(
     p: &TrigonometricPolynomial,
     point: &FieldPoint<FieldElement<P>>,

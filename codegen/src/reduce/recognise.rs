@@ -1,6 +1,7 @@
-//! Numbers as what a person would write: a small rational, or one times constants of the model file.
+//! Numbers written in a form that a person would choose: a small rational, or one times constants of the model file.
 //!
-//! Of all that equal a number in all its digits and have its unit the shortest is taken; what has none is rounded.
+//! Among all forms that equal a number in all its digits and have its unit, the shortest is used. A number without such
+//! a form is rounded.
 
 use modelmill_algebra::digits::BigFloat;
 use modelmill_spec::Mechanism;
@@ -13,41 +14,51 @@ use super::rational_function::{
 use crate::expr::Rational;
 use crate::tree::expressions::ParameterMonomial;
 
+/// Largest denominator of a rational that is recognised.
 const LARGEST_DENOMINATOR: i64 = 24;
+/// Largest numerator of a rational that is recognised.
 const LARGEST_NUMERATOR: f64 = 1000.0;
 
-/// Constants are put together only where so many digits are known.
+/// Products of several constants are tried only if numbers are known to this relative accuracy.
 const TOGETHER: f64 = 1e-20;
-/// Three constants are put together only where no more than this many stand in a file.
+/// Products of three constants are tried only in files with at most this many constants.
 const MOST_IN_THREES: usize = 12;
-/// The same for two.
+/// The same for products of two constants.
 const MOST_IN_PAIRS: usize = 60;
 
-/// Constants of a model file, alone and a few together.
+/// Constants of a model file, and products of powers of a few of them.
 pub(super) struct FileConstants<'a> {
+    /// The mechanism whose constants these are.
     mechanism: &'a Mechanism,
+    /// All products that are tried; the first one is 1.
     powers: Vec<ConstantPower>,
-    /// How far a number may be from what it is taken for, relative to it.
+    /// Largest relative difference between a number and a form that it is recognised as.
     rounding: f64,
 }
 
-/// A product of powers of constants.
+/// A product of powers of constants with its value.
 struct ConstantPower {
+    /// Constants in the numerator; a constant may occur twice.
     above: Vec<FactorVariable>,
+    /// Constants in the denominator.
     below: Vec<FactorVariable>,
+    /// Exact value for the decimals of the file.
     value: BigFloat,
+    /// The same in double precision.
     rough: f64,
-    /// Its unit as a power of metres.
+    /// Exponent of the metre in its unit.
     metres: i32,
 }
 
 impl ConstantPower {
+    /// Whether it is the product without factors.
     fn is_one(&self) -> bool {
         self.above.is_empty() && self.below.is_empty()
     }
 }
 
 impl<'a> FileConstants<'a> {
+    /// Collects the products that may occur for numbers with a relative error of `rounding`.
     pub(super) fn new(mechanism: &'a Mechanism, rounding: f64) -> Self {
         let one = ConstantPower {
             above: Vec::new(),
@@ -57,6 +68,7 @@ impl<'a> FileConstants<'a> {
             metres: 0,
         };
         let mut powers = vec![one];
+        // Only lengths and pure numbers are used; angles occur in factors only through sines and cosines.
         let lengths: Vec<(FactorVariable, BigFloat, i32)> =
             (mechanism.constants.iter().enumerate())
                 .filter(|(_, c)| !c.is_angle && c.value != 0.0)
@@ -96,7 +108,7 @@ impl<'a> FileConstants<'a> {
             push(&[i], &[]);
             push(&[], &[i]);
         }
-        // Of so many products some equal any number to a few digits.
+        // There are so many products that with few digits some would equal any number by chance.
         let together = if rounding <= TOGETHER {
             lengths.len()
         } else {
@@ -125,7 +137,7 @@ impl<'a> FileConstants<'a> {
         }
     }
 
-    /// The factor of the column of `kept` in that of `product`.
+    /// The factor of the retained column `kept` in the column of `product`, with the value `value`.
     pub(super) fn recognise_factor(
         &self,
         value: &BigFloat,
@@ -146,6 +158,7 @@ impl<'a> FileConstants<'a> {
             Some(n) => p.metres == n,
             None => p.is_one(),
         });
+        // A short form has small numbers and few constants.
         let found = fitting.filter_map(|power| {
             let number = self.small_rational(value, power)?;
             let (n, d) = number.as_small()?;
@@ -158,10 +171,12 @@ impl<'a> FileConstants<'a> {
         }
     }
 
-    /// `value` over `power`, if that is a small rational.
+    /// `value` divided by `power`, if that is a small rational number.
     fn small_rational(&self, value: &BigFloat, power: &ConstantPower) -> Option<Rational> {
+        // Relative difference up to which the exact comparison is made.
         const ROUGH: f64 = 1e-9;
         let ratio = value.to_f64() / power.rough;
+        // Denominators in increasing order; double precision rules out most of them before the exact comparison.
         (1..=LARGEST_DENOMINATOR).find_map(|below| {
             let wanted = ratio * below as f64;
             let above = wanted.round();
@@ -178,6 +193,7 @@ impl<'a> FileConstants<'a> {
     }
 }
 
+/// A number times a product of powers as a rational function.
 fn to_rational_function(number: Rational, power: &ConstantPower) -> RationalFunction {
     let powers = |of: &[FactorVariable]| {
         let mut powers = PowerProduct::new();
@@ -196,7 +212,7 @@ fn to_rational_function(number: Rational, power: &ConstantPower) -> RationalFunc
     )
 }
 
-/// The power of metres in the unit of a mass or one of its moments.
+/// The exponent of the metre in the unit of a mass or one of its moments; `None` for other units.
 pub(super) fn length_exponent(unit: &str) -> Option<i32> {
     match unit {
         "kg" => Some(0),
@@ -206,9 +222,10 @@ pub(super) fn length_exponent(unit: &str) -> Option<i32> {
     }
 }
 
-/// A number with thirteen significant digits, as an exact rational, so that everything behind treats it like any other
+/// A number rounded to thirteen significant digits, as an exact rational, so that later steps treat it like any other
 /// factor.
 fn decimal_function(value: f64) -> RationalFunction {
+    // Digits after the decimal point of the mantissa.
     const DIGITS: i32 = 12;
     let written = format!("{value:.12e}");
     let rational = written.split_once('e').and_then(|(mantissa, exponent)| {

@@ -1,9 +1,10 @@
-//! Dependences of columns as they are closest together, and the factors of eq. (6) put together from them.
+//! Relations between columns that depend on each other as directly as possible, and the factors of eq. (6) combined
+//! from them.
 //!
-//! A column that depends on others can often be written with a few near ones, which may depend on others in turn: the
-//! columns of a link of an arm need those of the link before it and the constants of the one joint between them (Gautier
-//! and Khalil 1990), while its factors on the retained columns run through all joints down to the base. So relations
-//! between neighbours are reconstructed, and factors are their sums of products.
+//! A dependent column can often be written with a few near columns, which may depend on others in turn. The columns of
+//! a link of an arm need only those of the link before it and the constants of the one joint between them (Gautier and
+//! Khalil 1990). Its factors on the retained columns depend on all joints down to the base. So relations between
+//! neighbours are reconstructed, and the factors are sums of their products.
 //!
 //! Decision: products of relations are multiplied out up to 5000 terms; beyond that, base parameters are given by
 //! named sums, link by link. Polynomials over powers of lengths have one normal form, so this gives the same result
@@ -21,67 +22,37 @@ use super::rational_function::{
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
-/// One column in terms of others, all by position among the effective ones.
+/// One column as a combination of others, all numbered among the columns with an effect.
 #[derive(Clone, Debug)]
 pub(super) struct ColumnRelation {
-    /// The column.
+    /// The column that the relation expresses.
     pub(super) column: usize,
-    /// Retained columns that it needs.
+    /// Retained columns in the combination.
     retained: Vec<usize>,
-    /// Columns that it needs and that have relations of their own, before this one.
+    /// Dependent columns in the combination, which have relations before this one.
     pub(super) dependent: Vec<usize>,
 }
 
 impl ColumnRelation {
-    /// How many factors it has.
+    /// Number of its factors.
     pub(super) fn len(&self) -> usize {
         self.retained.len() + self.dependent.len()
     }
 
-    /// Its factors from rows of values of all columns, of which there must be enough to determine them.
-    fn values_from_rows<const P: u64>(
-        &self,
-        rows: &[Vec<FieldElement<P>>],
-    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
-        /// Rows beyond those that determine the factors: they show that the relation holds.
-        const MORE: usize = 2;
-        let n = self.len();
-        let order: Vec<usize> = (0..=n).collect();
-        let mut echelon = RowEchelonForm::new(&order);
-        let mut more = 0;
-        for row in rows {
-            let columns = self.columns().chain([self.column]);
-            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
-            if row.iter().all(|x| *x == FieldElement::ZERO) {
-                continue;
-            }
-            if echelon.pivots.len() == n {
-                more += 1;
-            }
-            echelon.insert(row);
-            if more == MORE {
-                break;
-            }
-        }
-        // A pivot in the last column is a row that the others contradict.
-        if echelon.pivots.len() != n || echelon.pivots.contains(&n) {
-            return Err(DeriveError::RankChanged);
-        }
-        let factors = (0..n).map(|k| echelon.entry(k, n).ok_or(DeriveError::RankChanged));
-        factors.collect()
-    }
-
-    /// Whether it needs retained columns alone.
+    /// Whether it contains retained columns only.
     pub(super) fn has_retained_only(&self) -> bool {
         self.dependent.is_empty()
     }
 
-    /// Columns with a factor, in the order of [`Self::values`].
+    /// The columns of its factors, in the order of [`Self::values`].
     fn columns(&self) -> impl Iterator<Item = usize> + '_ {
         self.retained.iter().chain(&self.dependent).copied()
     }
 
     /// Its factors for the constants at which columns were reduced to `echelon`.
+    ///
+    /// # Errors
+    /// [`DeriveError::RankChanged`] if the columns have other dependences at these constants.
     fn values<const P: u64>(
         &self,
         echelon: &RowEchelonForm<P>,
@@ -89,7 +60,7 @@ impl ColumnRelation {
         let entry = |p: usize, k: usize| echelon.entry(p, k).ok_or(DeriveError::RankChanged);
         let mut of_dependent = Vec::new();
         if !self.dependent.is_empty() {
-            // Factors of the dependent columns from the rows of all retained ones that have no factor here.
+            // The factors of dependent columns must cancel all retained columns that are not in the relation.
             let mut rows = Vec::new();
             for p in &echelon.pivots {
                 if self.retained.contains(p) {
@@ -104,6 +75,7 @@ impl ColumnRelation {
                     rows.push(row);
                 }
             }
+            // The solution must be unique up to a scale, which is set by the column itself.
             let solutions = eliminate::null_space(rows, self.dependent.len() + 1);
             let [solution] = solutions.as_slice() else {
                 return Err(DeriveError::RankChanged);
@@ -112,6 +84,7 @@ impl ColumnRelation {
             let scale = last.inverse().ok_or(DeriveError::RankChanged)?;
             of_dependent.extend(rest.iter().map(|x| *x * scale));
         }
+        // The factors of retained columns are the remainder.
         let mut values = Vec::with_capacity(self.len());
         for p in &self.retained {
             let mut value = entry(*p, self.column)?;
@@ -125,10 +98,10 @@ impl ColumnRelation {
     }
 }
 
-/// Relations for every dependent column, in an order in which each needs earlier columns only: to retained
-/// columns, then, if they are fewer, to the columns before it that come last.
+/// Relations for every dependent column, in an order in which each needs only earlier columns. The relation to retained
+/// columns comes first. If fewer columns are sufficient, a relation to the last columns before this one follows.
 ///
-/// `order` is that in which columns are retained.
+/// `order` is the order in which columns are retained.
 pub(super) fn find_relations<const P: u64>(
     echelon: &RowEchelonForm<P>,
     order: &[usize],
@@ -139,6 +112,7 @@ pub(super) fn find_relations<const P: u64>(
         if !dependent.contains(column) {
             continue;
         }
+        // Retained columns with a factor that is not zero.
         let mut direct: Vec<usize> = (echelon.pivots.iter().copied())
             .filter(|p| echelon.entry(*p, *column) != Some(FieldElement::ZERO))
             .collect();
@@ -160,23 +134,28 @@ pub(super) fn find_relations<const P: u64>(
     found
 }
 
-/// The columns among those before `column` that it needs if the last ones are preferred.
+/// The columns among those before `column` that express it if the last ones are preferred.
 fn needed_columns<const P: u64>(
     echelon: &RowEchelonForm<P>,
     before: &[usize],
     column: usize,
 ) -> Vec<usize> {
-    /// Columns as vectors over the retained ones, each with what it is made of.
+    /// A column as a vector over the retained ones, with the combination of columns that it equals.
     struct ColumnCombination<const P: u64> {
+        /// Position of its first entry that is not zero, which is 1.
         pivot: usize,
+        /// Entries by retained column.
         vector: Vec<FieldElement<P>>,
+        /// Columns with their factors.
         combination: BTreeMap<usize, FieldElement<P>>,
     }
     let mut known: Vec<ColumnCombination<P>> = Vec::new();
+    // A column as a vector over the retained ones.
     let vector_of = |k: usize| -> Vec<FieldElement<P>> {
         let entries = echelon.pivots.iter().map(|p| echelon.entry(*p, k));
         entries.map(Option::unwrap_or_default).collect()
     };
+    // Eliminates the known pivots from a vector, and applies the same steps to its combination.
     let reduced = |known: &[ColumnCombination<P>],
                    target: &mut Vec<FieldElement<P>>,
                    of: &mut BTreeMap<_, _>| {
@@ -194,6 +173,7 @@ fn needed_columns<const P: u64>(
             }
         }
     };
+    // The target is reduced by columns from the last one backwards, until nothing of it remains.
     let (mut target, mut made) = (vector_of(column), BTreeMap::new());
     for &k in before.iter().rev() {
         let (mut vector, mut of) = (vector_of(k), BTreeMap::from([(k, FieldElement::ONE)]));
@@ -222,7 +202,10 @@ fn needed_columns<const P: u64>(
     made.into_keys().collect()
 }
 
-/// Values of the factors of all relations, one after the other, from columns that were reduced to `echelon`.
+/// Values of the factors of all relations in order, from columns that were reduced to `echelon`.
+///
+/// # Errors
+/// As [`ColumnRelation::values`].
 pub(super) fn values<const P: u64>(
     relations: &[ColumnRelation],
     echelon: &RowEchelonForm<P>,
@@ -234,34 +217,77 @@ pub(super) fn values<const P: u64>(
     Ok(values)
 }
 
-/// The same from rows of values of all columns.
-pub(super) fn values_from_rows<const P: u64>(
-    relations: &[ColumnRelation],
-    rows: &[Vec<FieldElement<P>>],
-) -> Result<Vec<FieldElement<P>>, DeriveError> {
-    let mut values = Vec::new();
-    for relation in relations {
-        values.extend(relation.values_from_rows(rows)?);
-    }
-    Ok(values)
+/// The factors of a relation, from rows of values of all columns as they come.
+pub(super) struct RelationRows<'a, const P: u64> {
+    relation: &'a ColumnRelation,
+    echelon: RowEchelonForm<P>,
+    /// How many rows came when the factors were determined.
+    n_more: usize,
 }
 
-/// A dependent column by others, with factors; `None` for those that resist.
+impl<'a, const P: u64> RelationRows<'a, P> {
+    pub(super) fn new(relation: &'a ColumnRelation) -> Self {
+        let order: Vec<usize> = (0..=relation.len()).collect();
+        Self {
+            relation,
+            echelon: RowEchelonForm::new(&order),
+            n_more: 0,
+        }
+    }
+
+    /// Takes further rows, as far as it needs them.
+    pub(super) fn take(&mut self, rows: &[Vec<FieldElement<P>>]) {
+        for row in rows {
+            if self.is_confirmed() {
+                break;
+            }
+            let columns = self.relation.columns().chain([self.relation.column]);
+            let row: Vec<FieldElement<P>> = columns.map(|k| row[k]).collect();
+            if row.iter().all(|x| *x == FieldElement::ZERO) {
+                continue;
+            }
+            if self.echelon.pivots.len() == self.relation.len() {
+                self.n_more += 1;
+            }
+            self.echelon.insert(row);
+        }
+    }
+
+    /// Whether rows beyond those that determine the factors have shown that the relation holds.
+    pub(super) fn is_confirmed(&self) -> bool {
+        const MORE: usize = 2;
+        self.n_more == MORE
+    }
+
+    /// The factors; an error if they are not determined, or rows contradict each other.
+    pub(super) fn values(&self) -> Result<Vec<FieldElement<P>>, DeriveError> {
+        let n = self.relation.len();
+        // A pivot in the last column is a row that the others contradict.
+        if self.echelon.pivots.len() != n || self.echelon.pivots.contains(&n) {
+            return Err(DeriveError::RankChanged);
+        }
+        let entry = |k| self.echelon.entry(k, n).ok_or(DeriveError::RankChanged);
+        (0..n).map(entry).collect()
+    }
+}
+
+/// A dependent column as a combination of others; factors that could not be reconstructed are `None`.
 #[derive(Debug, PartialEq)]
 pub(super) struct DependentColumn {
+    /// The column.
     pub(super) column: usize,
-    /// Retained columns, and dependent ones that stand for what they equal.
+    /// Factors of retained columns, and of dependent ones that are combinations themselves.
     pub(super) factors: Vec<(usize, Option<RationalFunction>)>,
 }
 
-/// Relations with their factors as functions of the constants.
+/// Relations with their factors as functions of the constants, in an order in which each needs only earlier columns.
 pub(super) struct SolvedRelations(Vec<(ColumnRelation, RelationFactors)>);
 
-/// The factor of each column of a relation; `None` for those that resist.
+/// The factor of each column of a relation; `None` if it could not be reconstructed.
 type RelationFactors = Vec<Option<RationalFunction>>;
 
 impl SolvedRelations {
-    /// Takes the factors as [`values`] orders them.
+    /// Assigns factors, in the order of [`values`], to the relations.
     pub(super) fn new<'a>(
         relations: impl Iterator<Item = &'a ColumnRelation>,
         factors: RelationFactors,
@@ -274,7 +300,8 @@ impl SolvedRelations {
         Self(relations.map(own).collect())
     }
 
-    /// Dependent columns whose relations to others that depend are not known, or hold quotients other than by lengths.
+    /// Dependent columns whose relations to other dependent columns are unknown, or have denominators other than
+    /// lengths.
     pub(super) fn unwieldy_columns(&self) -> Vec<usize> {
         let is_simple = |f: &Option<RationalFunction>| {
             f.as_ref()
@@ -287,7 +314,7 @@ impl SolvedRelations {
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
-    /// Whether a factor on retained columns resists, so that no others need be looked for.
+    /// Whether a factor on retained columns could not be reconstructed, so that the others are of no use.
     pub(super) fn has_unknown_factor(&self) -> bool {
         let mut direct = self
             .0
@@ -296,7 +323,7 @@ impl SolvedRelations {
         direct.any(|(_, factors)| factors.iter().any(Option::is_none))
     }
 
-    /// Puts others in the place of relations of the same columns, if they are known.
+    /// Replaces relations by others of the same columns, as far as these are completely known.
     pub(super) fn replace(&mut self, others: Self) {
         let known =
             |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
@@ -307,13 +334,14 @@ impl SolvedRelations {
         }
     }
 
-    /// The wanted factors, each written out if that takes no quotients but by lengths (the lowest terms of others are not
-    /// seen from their parts) and no roots that are not independent.
+    /// The wanted factors, each multiplied out if all denominators are products of lengths and all roots are
+    /// independent. Other factors are `None`, because their lowest terms cannot be determined from their parts.
     pub(super) fn expanded_factors(
         &self,
         wanted: &[(usize, usize)],
         roots: &[i64],
     ) -> Vec<Option<RationalFunction>> {
+        // Columns in order, so that the factors of dependent columns in a relation are already expanded.
         let mut expanded: BTreeMap<usize, RetainedFactors> = BTreeMap::new();
         for (relation, factors) in &self.0 {
             let line = if relation.has_retained_only() {
@@ -329,12 +357,13 @@ impl SolvedRelations {
         wanted.iter().map(|(j, p)| function(j, p)).collect()
     }
 
-    /// How many terms the factors on retained columns have together when they are written out, at most.
+    /// Upper limit of the number of terms that all factors on retained columns have together after multiplication.
     pub(super) fn n_terms(&self) -> usize {
         let mut counts: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
         for (relation, factors) in &self.0 {
             let mut line: BTreeMap<usize, usize> = BTreeMap::new();
             for (k, factor) in relation.columns().zip(factors) {
+                // Terms of a product of polynomials multiply, terms of sums add up.
                 let n = factor.as_ref().map_or(1, |f| f.numerator.len());
                 match counts.get(&k) {
                     None => *line.entry(k).or_default() += n,
@@ -352,7 +381,7 @@ impl SolvedRelations {
         all.fold(0_usize, |sum, n| sum.saturating_add(*n))
     }
 
-    /// The relations as they are.
+    /// The relations without expansion.
     pub(super) fn into_dependent_columns(self) -> Vec<DependentColumn> {
         let lines = self.0.into_iter();
         let written = |(relation, factors): (ColumnRelation, RelationFactors)| DependentColumn {
@@ -368,7 +397,7 @@ impl SolvedRelations {
         all.all(Option::is_some)
     }
 
-    /// Values of some wanted factors; `None` where a denominator vanishes.
+    /// Values of wanted factors for given constants; `None` where a denominator vanishes.
     pub(super) fn values<const P: u64>(
         &self,
         wanted: &[(usize, usize)],
@@ -395,21 +424,24 @@ impl SolvedRelations {
     }
 }
 
-/// Whether all are prime, so that no product of different ones is a square: those that occur are small.
+/// Whether all radicands are prime, so that no product of different roots is rational. A short search is sufficient,
+/// because the radicands that occur are small.
 fn are_independent(roots: &[i64]) -> bool {
     let is_prime = |n: i64| n > 1 && (2..n).take_while(|d| d * d <= n).all(|d| n % d != 0);
     roots.iter().all(|n| is_prime(*n))
 }
 
-/// A column's factors on retained ones.
+/// The factors of a column on retained columns.
 #[derive(Default)]
 struct RetainedFactors {
+    /// Factors that are known, by retained column.
     functions: BTreeMap<usize, RationalFunction>,
-    /// The same as quotients; `None` if one of them is more than that.
+    /// The same as polynomials over products of lengths; `None` if one of them has another form.
     quotients: Option<BTreeMap<usize, MonomialQuotient>>,
 }
 
 impl RetainedFactors {
+    /// The factors of a relation that contains retained columns only.
     fn from_relation(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
         let quotients =
@@ -420,6 +452,8 @@ impl RetainedFactors {
         }
     }
 
+    /// The factors of a relation whose dependent columns are expanded already; without factors if any form is
+    /// unsuitable.
     fn from_lines(
         relation: &ColumnRelation,
         factors: &[Option<RationalFunction>],
@@ -448,16 +482,18 @@ impl RetainedFactors {
     }
 }
 
-/// A polynomial over a product of powers of lengths, in lowest terms but for common powers of lengths. No square of a
-/// sine or root occurs, so that there is one way to write it.
+/// A polynomial divided by a product of powers of lengths, in lowest terms except for common powers of lengths. It
+/// contains no square of a sine or root, so its form is unique.
 #[derive(Clone, Debug, Default)]
 struct MonomialQuotient {
+    /// The polynomial.
     numerator: TrigonometricPolynomial,
+    /// Powers of lengths.
     denominator: PowerProduct,
 }
 
 impl MonomialQuotient {
-    /// `None` if the denominator is something else.
+    /// Converts a function; `None` if its denominator is no product of lengths.
     fn from_function(function: &RationalFunction) -> Option<Self> {
         let mut terms = function.denominator.iter();
         let (Some((powers, scale)), None) = (terms.next(), terms.next()) else {
@@ -478,6 +514,7 @@ impl MonomialQuotient {
         })
     }
 
+    /// The product.
     fn times(&self, other: &Self) -> Self {
         let mut numerator = TrigonometricPolynomial::new();
         for (a, x) in &self.numerator {
@@ -491,6 +528,7 @@ impl MonomialQuotient {
         }
     }
 
+    /// Adds another quotient, over the common denominator.
     fn add(&mut self, other: &Self) {
         let common = least_common_multiple(&self.denominator, &other.denominator);
         if common != self.denominator {
@@ -506,6 +544,7 @@ impl MonomialQuotient {
         }
     }
 
+    /// Converts to a general rational function in lowest terms.
     fn to_function(&self) -> RationalFunction {
         let denominator =
             TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
@@ -518,6 +557,7 @@ fn product(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     merge_powers(a, b, |n, m| n + m)
 }
 
+/// The product with the larger exponent of every variable.
 fn least_common_multiple(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     merge_powers(a, b, u32::max)
 }
@@ -527,6 +567,7 @@ fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     merge_powers(a, b, |n, m| n - m)
 }
 
+/// Combines the exponents of two sorted products of powers, variable by variable; zero exponents are dropped.
 fn merge_powers(
     a: &PowerProduct,
     b: &PowerProduct,
@@ -550,11 +591,12 @@ fn merge_powers(
     }
 }
 
-/// Adds a term with squares of sines and roots written otherwise.
+/// Adds a term, after squares of sines and roots have been replaced: `sin^2 = 1 - cos^2`, and `root^2` is a number.
 fn add_term(to: &mut TrigonometricPolynomial, powers: PowerProduct, k: &Rational) {
     if k.is_zero() {
         return;
     }
+    // The first variable whose square must be replaced.
     let squared = powers
         .iter()
         .position(|(v, n)| *n > 1 && matches!(v, FactorVariable::Sin(_) | FactorVariable::Root(_)));
@@ -573,6 +615,7 @@ fn add_term(to: &mut TrigonometricPolynomial, powers: PowerProduct, k: &Rational
         }
         return;
     };
+    // One square is taken out; the remaining term is added recursively.
     let (variable, n) = powers[at];
     let mut rest = powers;
     if n == 2 {

@@ -1,12 +1,12 @@
-//! Random points of a mechanism's motion in the prime field: poses, drawn again until all their square roots exist, with
-//! rates and accelerations from the differentiated loops.
+//! Random points of a mechanism's motion in the prime field. Poses are drawn until all their square roots exist. Rates
+//! and accelerations are those of the differentiated loops.
 //!
-//! Which coordinates are drawn freely does not matter for linear dependence, so those are drawn that make every loop
-//! a dyad. It matters that the poses make up one irreducible variety, the one that the nominal pose lies on; see
-//! [`crate::loops::branches`].
+//! For linear dependence it does not matter which coordinates are drawn and which are solved for. So coordinates are
+//! chosen such that every loop is a dyad. The poses must make up one irreducible variety, the one that contains the
+//! nominal pose; see [`crate::loops::branches`].
 //!
-//! Decision: rows are drawn until two points in a row add nothing, and not in a fixed number. On one irreducible
-//! variety a random point either adds a new equation or there is none left, with an error probability of 2^-55.
+//! Decision: rows are drawn until two points in a row add nothing, instead of in a fixed number. On one irreducible
+//! variety a random point either adds a new equation or there is none, with an error probability of 2^-55.
 
 use modelmill_algebra::eliminate::RowEchelonForm;
 use modelmill_algebra::field::{ExtensionElement, FieldElement, FieldNumber, RandomStream};
@@ -20,25 +20,36 @@ use crate::loops::field_poses::{FieldPoseSampler, MOST_DRAWS};
 use crate::loops::plan::{SolvableCoordinates, plan};
 use crate::regressor::projection::LoopProjection;
 
-/// The same where signs occur, which take only two values: that two of them agree by chance at all points must be out of
-/// the question.
+/// The same as [`IDLE`] where signs occur. A sign has only two values, so two of them agree by chance at single points,
+/// but not at all of these.
 const IDLE_WITH_SIGNS: usize = 80;
 
-/// Draws points.
+/// Evaluates outputs at random points of the motion.
 pub(super) struct MotionSampler {
+    /// Poses with closed loops.
     poses: FieldPoseSampler,
+    /// Number of drives, whose loads are drawn as well.
     n_drives: usize,
-    /// Whether poses or outputs take roots of what moves.
+    /// Whether poses or outputs contain square roots of coordinates.
     has_roots: bool,
+    /// Indices of the active coordinates, whose rates and accelerations are drawn.
     active: Vec<usize>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
+    /// Rates of the passive coordinates.
     rates: EvaluationTape,
+    /// Accelerations of the passive coordinates.
     accelerations: EvaluationTape,
+    /// The expressions that are evaluated.
     outputs: EvaluationTape,
 }
 
 impl MotionSampler {
     /// Prepares the evaluation of `outputs` at random points of the mechanism's motion.
+    ///
+    /// # Errors
+    /// [`DeriveError::LoopsNotSampled`] if there is no plan for the loops, [`DeriveError::BranchesNotSeparated`] if a
+    /// root's sign is determined by the motion.
     pub(super) fn new(
         graph: &mut Graph,
         mechanism: &Mechanism,
@@ -60,10 +71,12 @@ impl MotionSampler {
             SolvableCoordinates::Any,
         )
         .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
+        // Passive rates and accelerations are needed at every point, so their roots must exist too.
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
         all.extend(&projection.passive_accelerations);
         let poses = FieldPoseSampler::new(graph, mechanism, plan, &all);
+        // Every root must have a free sign, or equal an earlier root.
         let branches = branches::root_branches(graph, &poses, &all)?;
         if branches
             .iter()
@@ -83,7 +96,7 @@ impl MotionSampler {
         })
     }
 
-    /// Random constants whose functions that do not depend on the motion all exist.
+    /// Random constants at which all functions of constants exist.
     pub(super) fn constants<const P: u64>(
         &self,
         stream: &mut RandomStream,
@@ -91,15 +104,16 @@ impl MotionSampler {
         self.poses.draw_constants(stream)
     }
 
-    /// Values of the outputs at a random point of motion, for the given constants: once, or once for each of the two
-    /// parts of numbers of the quadratic extension. Factors that do not depend on the motion lie in the prime field, so
-    /// that each part keeps to the same linear relations.
+    /// Values of the outputs at a random point of motion, for the given constants. If they lie in the quadratic
+    /// extension, both parts of the numbers are returned, one after the other. Factors that do not depend on the motion
+    /// lie in the prime field, so each part satisfies the same linear relations.
     pub(super) fn draw<const P: u64>(
         &self,
         constants: &FieldPoint<FieldElement<P>>,
         stream: &mut RandomStream,
     ) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let none = || DeriveError::NoPointFound { draws: MOST_DRAWS };
+        // Without roots all values lie in the prime field.
         if !self.has_roots {
             return (0..MOST_DRAWS)
                 .find_map(|_| self.try_draw::<P, FieldElement<P>>(constants, stream))
@@ -108,6 +122,7 @@ impl MotionSampler {
         let values = (0..MOST_DRAWS)
             .find_map(|_| self.try_draw::<P, ExtensionElement<P>>(constants, stream))
             .ok_or_else(none)?;
+        // The imaginary parts are returned only if one of them is not zero.
         let parts: [fn(&ExtensionElement<P>) -> FieldElement<P>; 2] = [|x| x.re, |x| x.im];
         let is_split = values.iter().any(|x| x.im != FieldElement::ZERO);
         let shown = &parts[..=usize::from(is_split)];
@@ -117,12 +132,14 @@ impl MotionSampler {
             .collect())
     }
 
+    /// Values of the outputs at one draw; `None` if a root or a quotient does not exist there.
     fn try_draw<const P: u64, N: FieldNumber + From<FieldElement<P>>>(
         &self,
         constants: &FieldPoint<FieldElement<P>>,
         stream: &mut RandomStream,
     ) -> Option<Vec<N>> {
         let mut point: FieldPoint<N> = self.poses.draw_open_point(constants, stream);
+        // Rates, accelerations and loads are independent of each other.
         let mut draw = |atom: Atom| point.values.insert(atom, N::draw(stream));
         for a in &self.active {
             draw(Atom::Rate(*a));
@@ -131,6 +148,7 @@ impl MotionSampler {
         for d in 0..self.n_drives {
             draw(Atom::Load(d));
         }
+        // The loops determine the passive coordinates, then their rates, then their accelerations.
         let mut point = self.poses.close_loops(point)?;
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.values.insert(Atom::Rate(*p), value);
@@ -148,14 +166,16 @@ impl MotionSampler {
 
 /// The regressor's effective columns at random points of motion.
 pub(super) struct SampledRegressor {
+    /// Evaluates the columns, drive by drive.
     pub(super) sampler: MotionSampler,
+    /// Number of columns.
     pub(super) n_columns: usize,
-    /// How many points in a row must show nothing new.
+    /// Number of points in a row that must add no new row before sampling ends.
     idle: usize,
 }
 
 impl SampledRegressor {
-    /// The rows of H at one random point.
+    /// The rows of H at one random point, one per drive and part of the numbers.
     pub(super) fn draw_rows<const P: u64>(
         &self,
         constants: &FieldPoint<FieldElement<P>>,
@@ -168,8 +188,8 @@ impl SampledRegressor {
             .collect())
     }
 
-    /// Rows of W for one set of constants, reduced, until they show nothing new or `rank` is reached; and from how many
-    /// points they came.
+    /// Rows of W for one set of constants in echelon form, until points add nothing new or `rank` is reached, and the
+    /// number of points that they come from. Columns are tried as pivots in `order`.
     pub(super) fn reduced_rows<const P: u64>(
         &self,
         constants: &FieldPoint<FieldElement<P>>,
@@ -192,7 +212,7 @@ impl SampledRegressor {
     }
 }
 
-/// Prepares the evaluation of so many columns, drive by drive.
+/// Prepares the evaluation of `n_columns` columns, given drive by drive.
 pub(super) fn sample_regressor(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -211,6 +231,7 @@ pub(super) fn sample_regressor(
     })
 }
 
+/// Whether outputs contain signs or absolute values.
 fn has_sign(graph: &Graph, outputs: &[ExprId]) -> bool {
     graph
         .nodes_of(outputs)

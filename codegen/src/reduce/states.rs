@@ -1,5 +1,5 @@
-//! States of a mechanism at the model file's values, with many digits: poses that a walk finds, closed further, with the rows
-//! of the regressor there.
+//! States of a mechanism at the model file's values, with many digits: poses of a walk are closed to all digits, and
+//! the rows of the regressor are evaluated there.
 
 use modelmill_algebra::digits::BigFloat;
 use modelmill_algebra::field::RandomStream;
@@ -13,27 +13,43 @@ use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::loops::walk::{NEARLY_CLOSED, PoseWalk, all_residuals};
 use crate::regressor::projection::LoopProjection;
 
-/// Shows rows of the regressor at ever further states of one walk.
+/// Evaluates rows of the regressor at successive states of one walk.
 pub(super) struct WalkSampler<'a> {
+    /// Kinds of coordinates and values of the file.
     mechanism: &'a Mechanism,
+    /// The walk, in double precision.
     walk: PoseWalk<'a>,
-    /// The equations that are kept, by the passive coordinates.
+    /// The selected equations with their derivatives by the passive coordinates.
     kept: NumericLoops<'a>,
+    /// Indices of the active coordinates.
     active: Vec<usize>,
+    /// Indices of the passive coordinates.
     passive: Vec<usize>,
+    /// Number of columns of the regressor.
     n_columns: usize,
+    /// Number of drives, which is the number of rows per state.
     n_drives: usize,
+    /// The selected residuals, then all residuals.
     residual: EvaluationTape,
+    /// Rates of the passive coordinates.
     rates: EvaluationTape,
+    /// Accelerations of the passive coordinates.
     accelerations: EvaluationTape,
+    /// The regressor, drive by drive.
     outputs: EvaluationTape,
+    /// Values of pi, constants and parameters.
     constants: BigFloatPoint,
+    /// Random numbers for rates, accelerations and loads.
     stream: RandomStream,
+    /// Largest residual so far of equations that are not selected, relative to the size of the loops.
     off: f64,
 }
 
 impl<'a> WalkSampler<'a> {
-    /// Prepares the columns `columns[k][d]`.
+    /// Prepares the columns `columns[k][d]` (product by drive).
+    ///
+    /// # Errors
+    /// [`DeriveError::NoPointFound`] if the nominal pose cannot be closed or a value of the file is not finite.
     pub(super) fn new(
         graph: &mut Graph,
         mechanism: &'a Mechanism,
@@ -47,6 +63,7 @@ impl<'a> WalkSampler<'a> {
         let outputs: Vec<ExprId> = (0..n_drives)
             .flat_map(|d| columns.iter().map(move |c| c[d]))
             .collect();
+        // Values of the file as the decimals that were written, not as binary numbers.
         let mut constants = BigFloatPoint::default();
         let mut set = |atom, value: Option<BigFloat>, is_angle| {
             value.and_then(|value| constants.set(atom, value, is_angle))
@@ -85,10 +102,14 @@ impl<'a> WalkSampler<'a> {
         })
     }
 
-    /// At least `wanted` rows at states that were not shown before. The largest number in the rows of a state is about one.
+    /// At least `wanted` rows at new states. Each state's rows are scaled so that their largest number is about 1.
+    ///
+    /// # Errors
+    /// [`DeriveError::NoPointFound`] if the walk makes no progress or the rows have no values.
     pub(super) fn next_rows(&mut self, wanted: usize) -> Result<Vec<Vec<BigFloat>>, DeriveError> {
+        // Draws per state.
         const TRIES: usize = 10;
-        /// A walk that comes to no end so often comes to none.
+        /// Number of consecutive failures after which the walk is given up.
         const STUCK: usize = 3;
         let n_states = wanted.div_ceil(self.n_drives.max(1)).max(1);
         let mut rows = Vec::new();
@@ -115,6 +136,7 @@ impl<'a> WalkSampler<'a> {
                 clippy::cast_possible_truncation,
                 reason = "the exponent of a machine number"
             )]
+            // Scaling by a power of two is exact.
             let scale = -(largest.log2() as i64);
             let scaled: Vec<BigFloat> = values
                 .iter()
@@ -134,13 +156,13 @@ impl<'a> WalkSampler<'a> {
         self.walk.loop_size()
     }
 
-    /// What the digits of the file's constants leave open in loops with more equations than they need, relative to their size:
-    /// the largest at all states so far.
+    /// The largest residual, over all states so far, of loops with more equations than needed, relative to their size.
+    /// It is caused by rounded constants in the file.
     pub(super) fn closure_error(&self) -> f64 {
         self.off
     }
 
-    /// What the outputs are at a pose, with random rates, accelerations and loads.
+    /// Values of the outputs at a pose, with random rates, accelerations and loads; `None` where they do not exist.
     fn evaluate_at(&mut self, q: &[f64]) -> Option<Vec<BigFloat>> {
         let (mut point, off) = self.close_loops(q)?;
         for i in self.active.clone() {
@@ -150,10 +172,12 @@ impl<'a> WalkSampler<'a> {
             point.set(Atom::Rate(i), random(2.0)?, false)?;
             point.set(Atom::Acceleration(i), random(5.0)?, false)?;
         }
+        // Loads of the size of forces in N.
         for d in 0..self.n_drives {
             let load = BigFloat::from_f64(100.0 * uniform_symmetric(&mut self.stream))?;
             point.set(Atom::Load(d), load, false)?;
         }
+        // Passive rates come before the accelerations, which depend on them.
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.set(Atom::Rate(*p), value, false)?;
         }
@@ -169,10 +193,10 @@ impl<'a> WalkSampler<'a> {
         Some(values)
     }
 
-    /// A pose with its passive coordinates to all digits, and what that leaves of equations that should follow from those
-    /// that are kept, relative to the size of the loops; `None` if they do not.
+    /// A pose with its passive coordinates to all digits, and the largest residual of equations that are not selected,
+    /// relative to the size of the loops. `None` if the loops do not close.
     fn close_loops(&self, q: &[f64]) -> Option<(BigFloatPoint, f64)> {
-        /// Each round gives as many digits as the inverse has.
+        /// Largest number of Newton steps. Each adds as many correct digits as the inverse has in double precision.
         const ROUNDS: usize = 40;
         let mut point = self.constants.clone();
         let place = |point: &mut BigFloatPoint, i: usize, value: BigFloat| {
@@ -189,12 +213,14 @@ impl<'a> WalkSampler<'a> {
         for (mut column, p) in jacobian.column_iter_mut().zip(&self.passive) {
             column *= self.walk.coordinate_unit(*p);
         }
+        // The derivatives stay those of the first pose: its inverse is accurate enough for linear convergence.
         let inverse: DMatrix<f64> = jacobian.try_inverse()?;
         for _ in 0..ROUNDS {
             let values = self.residual.evaluate(&point)?;
             let (kept, all) = values.split_at(self.passive.len());
             let gaps = DVector::from_iterator(kept.len(), kept.iter().map(BigFloat::to_f64));
             let step = &inverse * gaps;
+            // Converged: the other equations must be satisfied as well.
             if step.amax() < BigFloat::ROUNDING {
                 let relative = all.iter().zip(self.walk.residual_sizes());
                 let relative = relative.map(|(x, size)| x.to_f64().abs() / size);
@@ -211,8 +237,10 @@ impl<'a> WalkSampler<'a> {
     }
 }
 
-/// A constant angle: a whole multiple of a quarter of a degree where it is one up to rounding, or else what was written.
+/// A constant angle with all digits: a multiple of a quarter of a degree if the value equals one up to rounding, else
+/// the decimal that was written.
 fn declared_angle(value: f64) -> Option<BigFloat> {
+    // Quarters of a degree in half a revolution.
     const PER_HALF_TURN: f64 = 720.0;
     let n = (value / std::f64::consts::PI * PER_HALF_TURN).round();
     let is_near = (n * std::f64::consts::PI / PER_HALF_TURN - value).abs()

@@ -1,7 +1,7 @@
-//! Which monomials a rational function has, where all that its degrees allow are too many for one linear system.
+//! The monomials of a rational function that have a coefficient, for degrees that allow too many for one linear system.
 //!
-//! Variables are let loose one after the other while the rest stay at a point (Zippel 1979, 1990): a monomial can only
-//! have a coefficient if it had one before with its last variable left away.
+//! Variables are varied one after the other while the rest stay at a point (Zippel 1979, 1990). A monomial can only
+//! have a coefficient if it had one before, without its last variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,19 +13,22 @@ use super::rational_function::{FactorVariable, PowerProduct, monomial_value};
 use crate::DeriveError;
 use crate::expr::{Atom, FieldPoint};
 
-/// Points at which the constants up to one of them are drawn anew and the others stay at the origin, with the values of
-/// all functions there; by the last constant that is drawn.
+/// Points at which the constants up to one of them are drawn again and the others stay at the origin, with the values
+/// of all functions. They are grouped by the last constant that is drawn.
 ///
-/// A function does not change with constants on which it does not depend. So the same points serve all functions,
-/// whichever of these constants each depends on.
+/// A function does not change with constants on which it does not depend. So the same points can be used for all
+/// functions, whichever of these constants each one depends on.
 pub(super) struct PartialSamples {
+    /// The point from which constants are varied.
     origin: FieldPoint,
+    /// All constants on which any function may depend.
     constants: Vec<ConstantOccurrence>,
+    /// Points with values, by the last constant that is drawn.
     by_last_constant: BTreeMap<ConstantOccurrence, Vec<(FieldPoint, Vec<FieldElement>)>>,
 }
 
 impl PartialSamples {
-    /// No points yet; `constants` are all on which any function may depend.
+    /// Without points; `constants` are all constants on which any function may depend.
     pub(super) fn new(origin: &FieldPoint, constants: &[ConstantOccurrence]) -> Self {
         Self {
             origin: origin.clone(),
@@ -34,7 +37,7 @@ impl PartialSamples {
         }
     }
 
-    /// At least `n` points at which the constants up to `last` are drawn anew.
+    /// At least `n` points at which the constants up to `last` are drawn again.
     fn at_least<O: PrimeFieldOracle>(
         &mut self,
         n: usize,
@@ -56,8 +59,8 @@ impl PartialSamples {
     }
 }
 
-/// The monomials of numerator and denominator among those given that have a coefficient at a random place; `None` where
-/// a stage has more unknowns than `most`, or more than one solution. `variables` are in ascending order.
+/// The monomials of numerator and denominator that have a coefficient at a random point, among the given ones. `None`
+/// if a stage has more unknowns than `most`, or more than one solution. `variables` are in ascending order.
 pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     samples: &mut PartialSamples,
     oracle: &mut O,
@@ -67,13 +70,15 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     most: usize,
     stream: &mut RandomStream,
 ) -> Result<Option<[Vec<PowerProduct>; 2]>, DeriveError> {
-    /// Equations beyond the unknowns: they show that the ansatz holds.
+    /// Number of equations in addition to the unknowns: they confirm the ansatz.
     const MORE: usize = 4;
+    // With no variable varied, the only monomial is 1.
     let mut kept: [BTreeSet<PowerProduct>; 2] =
         [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
     for n in 1..=variables.len() {
         let loose = &variables[..n];
         oracle.charge((numerator.len() + denominator.len()) * 100)?;
+        // Candidates: monomials whose part without the new variable had a coefficient.
         let [top, bottom] = [(numerator, &kept[0]), (denominator, &kept[1])].map(|(all, kept)| {
             let candidates: BTreeSet<PowerProduct> = all
                 .iter()
@@ -88,6 +93,7 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
         }
         let n_rows = unknowns + MORE;
         let points = samples.at_least(n_rows, loose[n - 1], oracle, stream)?;
+        // One equation per point: numerator - value * denominator = 0.
         let mut rows = Vec::with_capacity(n_rows);
         for (point, values) in &points[..n_rows] {
             let value = values[function];
@@ -102,6 +108,7 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
         let [solution] = solutions.as_slice() else {
             return Ok(None);
         };
+        // Monomials with a coefficient remain for the next stage.
         let with_coefficient =
             |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
                 let pairs = monomials.iter().zip(factors);
@@ -117,7 +124,7 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     Ok(Some(kept.map(|set| set.into_iter().collect())))
 }
 
-/// What a monomial is of some variables alone.
+/// The part of a monomial that consists of some variables; roots are kept.
 fn restrict_monomial(powers: &PowerProduct, variables: &[ConstantOccurrence]) -> PowerProduct {
     let is_in = |variable: &FactorVariable| match variable {
         FactorVariable::Constant(i) => variables.contains(&(*i, false)),
@@ -127,7 +134,7 @@ fn restrict_monomial(powers: &PowerProduct, variables: &[ConstantOccurrence]) ->
     powers.iter().filter(|(v, _)| is_in(v)).copied().collect()
 }
 
-/// The origin with some constants drawn anew.
+/// The origin with some constants drawn again, such that all functions exist.
 fn redraw_constants<O: PrimeFieldOracle>(
     oracle: &O,
     origin: &FieldPoint,

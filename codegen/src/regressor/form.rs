@@ -1,4 +1,4 @@
-//! The forms in which regressor and inverse dynamics can be written: equal values at different cost.
+//! The forms in which regressor and inverse dynamics can be written. All have equal values and different cost.
 
 use std::collections::BTreeMap;
 
@@ -12,20 +12,23 @@ use crate::newton_euler::{
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
 
-/// How the columns of a regressor are written.
+/// The form of a regressor's columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ColumnForm {
+    /// Style of the recursion.
     pub(crate) style: RecursionStyle,
+    /// Depths up to which moments and forces are carried link by link.
     pub(crate) depths: CarryDepths,
-    /// Moments of inertia about a joint's own axis are written on the fixed side of the joint, and those about x and y
-    /// as second moments less that.
+    /// Whether moments of inertia about a joint's axis are written on the fixed side of the joint, and those about x
+    /// and y as second moments minus that.
     pub(crate) axial: bool,
-    /// Links with parallel axes share the axes of what carries the first of them; inertia is turned there.
+    /// Whether links with parallel axes use the axes of the link that carries the first of them; inertia is rotated
+    /// there.
     pub(crate) fixed_axes: bool,
 }
 
 impl ColumnForm {
-    /// As in the textbooks: each column by itself, link by link.
+    /// The textbook form: each column by itself, link by link.
     pub(crate) const PLAIN: Self = Self {
         style: RecursionStyle::PLAIN,
         depths: CarryDepths {
@@ -36,7 +39,7 @@ impl ColumnForm {
         fixed_axes: false,
     };
 
-    /// The wrenches of one product of value 1 among all products whose columns are written.
+    /// The wrenches of one product of value 1; `products` are all products whose columns are written.
     pub(crate) fn wrenches(
         self,
         graph: &mut Graph,
@@ -45,6 +48,7 @@ impl ColumnForm {
         product: &ParameterMonomial,
         products: &[ParameterMonomial],
     ) -> Vec<(usize, JointSide, SymbolicWrench)> {
+        // Links to which the product contributes.
         let bodies: Vec<(usize, InertiaFactors)> = inertia
             .link_inertias(product)
             .map(|(link, inertia)| (link, *inertia))
@@ -52,6 +56,7 @@ impl ColumnForm {
         let (tree, motion) = (&frames.tree, &frames.motion);
         let mut wrenches = Vec::new();
         for (link, body) in &bodies {
+            // A single moment of inertia may have a cheaper form.
             let only = single_moment(body).filter(|_| self.axial);
             match only {
                 Some(2) => {
@@ -60,7 +65,7 @@ impl ColumnForm {
                 }
                 Some(axis) if has_axial_column(inertia, *link, products) => {
                     let mut second = [Graph::ZERO; 2];
-                    // The moment of inertia about x holds the second moment along y.
+                    // The moment of inertia about x contains the second moment along y.
                     second[1 - axis] = Graph::ONE;
                     let body = BodyInertia {
                         spread: InertiaDiagonal::Flat(second),
@@ -69,7 +74,9 @@ impl ColumnForm {
                     let body = frames.rotate_body(graph, *link, &body);
                     let flat = motion.wrench(graph, *link, &body);
                     let axial = motion.axial_moment(graph, *link);
+                    // Minus the moment about the joint's axis, whose column exists anyway.
                     let less = axial.map(|m| graph.neg(m));
+                    // Deep in the tree both parts are added at once, on the fixed side of the joint.
                     let depth = tree.path_to(Some(*link)).len();
                     if depth <= self.depths.moments {
                         wrenches.push((*link, JointSide::Moving, flat));
@@ -92,20 +99,21 @@ impl ColumnForm {
     }
 }
 
-/// How the inverse dynamics is written.
+/// The form of the inverse dynamics.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TotalForm {
+    /// Style of the recursion.
     pub(crate) style: RecursionStyle,
-    /// Second moments along joint axes are moved to what carries the joint.
+    /// Whether second moments along joint axes are moved to the link that carries the joint.
     pub(crate) flat: bool,
-    /// At the ends of the tree the inertia is turned rather than the motion.
+    /// Whether the inertia is rotated instead of the motion at the ends of the tree.
     pub(crate) turn_ends: bool,
     /// As in [`ColumnForm`].
     pub(crate) fixed_axes: bool,
 }
 
 impl TotalForm {
-    /// As in the textbooks.
+    /// The textbook form.
     pub(crate) const PLAIN: Self = Self {
         style: RecursionStyle::PLAIN,
         flat: false,
@@ -113,7 +121,7 @@ impl TotalForm {
         fixed_axes: false,
     };
 
-    /// The wrenches of all links when every product has the value that `value` gives it.
+    /// The wrenches of all links if every product has the value that `value` returns.
     pub(crate) fn wrenches(
         self,
         graph: &mut Graph,
@@ -122,6 +130,7 @@ impl TotalForm {
         frames: &RecursionFrames,
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Vec<(usize, JointSide, SymbolicWrench)> {
+        // All products together.
         let inertia = inertia.total_inertias(graph, value);
         let mut bodies: BTreeMap<usize, BodyInertia> = inertia
             .iter()
@@ -138,15 +147,18 @@ impl TotalForm {
     }
 }
 
-/// The frames in which a form is written, and how they move.
+/// The frames in which a form is written, and their motion.
 pub(crate) struct RecursionFrames {
+    /// The tree in these frames.
     pub(crate) tree: KinematicTree,
-    /// How the axes of every link are turned there; nothing for the links' own axes.
+    /// Rotation of the axes of every link; empty for the links' own axes.
     turns: Vec<AxisRotation>,
+    /// Motion of the links in these frames.
     pub(crate) motion: TreeMotion,
 }
 
 impl RecursionFrames {
+    /// The frames of a style, in the links' own axes or in fixed ones.
     pub(crate) fn new(
         graph: &mut Graph,
         tree: &KinematicTree,
@@ -154,11 +166,13 @@ impl RecursionFrames {
         style: RecursionStyle,
         fixed_axes: bool,
     ) -> Self {
+        // In fixed axes, links with parallel joints share the axes of the first one.
         let (tree, turns) = if fixed_axes {
             tree.to_fixed_axes(graph)
         } else {
             (tree.clone(), Vec::new())
         };
+        // Velocities and accelerations from the base to the ends.
         let motion = newton_euler::forward_recursion(graph, &tree, gravity, style);
         Self {
             tree,
@@ -167,6 +181,7 @@ impl RecursionFrames {
         }
     }
 
+    /// An inertia of a link in the axes of its frame.
     pub(crate) fn rotate_body(
         &self,
         graph: &mut Graph,
@@ -180,6 +195,7 @@ impl RecursionFrames {
     }
 }
 
+/// A wrench without force.
 fn pure_moment(moment: vector::SymbolicVector) -> SymbolicWrench {
     SymbolicWrench {
         force: vector::ZERO,
@@ -187,19 +203,20 @@ fn pure_moment(moment: vector::SymbolicVector) -> SymbolicWrench {
     }
 }
 
-/// The axis about which an inertia is a moment of inertia of 1, if it is nothing else.
+/// The axis of a moment of inertia of 1, if the inertia has no other entry.
 fn single_moment(inertia: &InertiaFactors) -> Option<usize> {
     let mut nonzero = (0..inertia.len()).filter(|i| inertia[*i] != Graph::ZERO);
     let only = nonzero.next()?;
     if nonzero.next().is_some() || inertia[only] != Graph::ONE {
         return None;
     }
+    // Positions of xx, yy and zz.
     [0, 3, 5]
         .iter()
         .position(|i| InertiaElement::Inertia(*i).index() == only)
 }
 
-/// Whether one of some products is the moment of inertia of a link about its joint's axis.
+/// Whether one of the products is the moment of inertia of a link about the axis of its joint.
 fn has_axial_column(
     inertia: &InertiaByProduct,
     link: usize,

@@ -1,3 +1,4 @@
+//! A mechanism goes in, the equations before reduction come out: tree, inertia, projection and columns.
 //! The regressor H of eq. (4): one column per product of dynamic parameters, one row per drive.
 
 pub(crate) mod form;
@@ -21,12 +22,15 @@ use crate::tree::expressions::{self, ParameterMonomial};
 
 /// The mechanism's equations before reduction.
 pub(crate) struct UnreducedEquations {
+    /// The open tree.
     pub(crate) tree: KinematicTree,
-    /// Acceleration of free fall.
+    /// Gravity in the axes of the base, m/s^2.
     pub(crate) gravity: crate::expr::vector::SymbolicVector,
+    /// Inertia of the links by product of parameters.
     pub(crate) inertia: InertiaByProduct,
+    /// Kinematics of loops and drives.
     pub(crate) projection: LoopProjection,
-    /// For every effect what [`mechanics::generalised_forces`] says of it.
+    /// For every effect the result of [`mechanics::generalised_forces`].
     of_mechanics: Vec<Vec<Vec<Vec<ExprId>>>>,
     /// Products of parameters that occur anywhere, in the order of eq. (5).
     pub(crate) products: Vec<ParameterMonomial>,
@@ -34,17 +38,20 @@ pub(crate) struct UnreducedEquations {
     pub(crate) columns: Vec<Vec<ExprId>>,
 }
 
-/// Forces of effects: generalised ones by coordinate of the open tree, and those along the drives.
+/// Forces of effects.
 pub(crate) struct EffectForces {
+    /// Generalised forces by coordinate of the open tree.
     pub(crate) on_tree: Vec<ExprId>,
+    /// Forces along the drives.
     pub(crate) on_drives: Vec<ExprId>,
 }
 
-/// Derives the regressor of all products.
+/// Derives the regressor H for all products of parameters.
 pub(crate) fn unreduced_equations(
     graph: &mut Graph,
     mechanism: &Mechanism,
 ) -> Result<UnreducedEquations, DeriveError> {
+    // Kinematics and inertia of the open tree, then loops and drives.
     let tree = KinematicTree::new(graph, mechanism)?;
     let gravity = [
         expressions::expression(graph, &mechanism.gravity[0])?,
@@ -64,8 +71,10 @@ pub(crate) fn unreduced_equations(
             effect,
         )?);
     }
+    // Products of bodies and parameters of effects, in the order of eq. (5).
     let mut products: BTreeSet<ParameterMonomial> = inertia.products();
-    // Bodies of effects are among the inertia already.
+    // The bodies of effects are part of the inertia already.
+    // Effects of expressions always have columns, those of mechanics only if they have forces.
     let all = mechanism.effects.iter().zip(&of_mechanics);
     for (effect, _) in all.filter(|(e, forces)| e.mechanics.is_none() || !forces.is_empty()) {
         products.extend(
@@ -85,6 +94,7 @@ pub(crate) fn unreduced_equations(
         products,
         columns: Vec::new(),
     };
+    // Columns in the plain form; cheaper forms are searched for the retained ones only.
     let form = ColumnForm::PLAIN;
     let frames = RecursionFrames::new(graph, &equations.tree, &gravity, form.style, false);
     let products = equations.products.clone();
@@ -93,7 +103,7 @@ pub(crate) fn unreduced_equations(
 }
 
 impl UnreducedEquations {
-    /// Forces of the drives for each of some products of value 1, all others 0.
+    /// Forces of the drives for each of some products with the value 1 and all others 0.
     pub(crate) fn columns_of(
         &self,
         graph: &mut Graph,
@@ -107,6 +117,7 @@ impl UnreducedEquations {
         products
             .iter()
             .map(|product| {
+                // Wrenches of the links, carried to the joints.
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
                 let on_tree =
                     newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
@@ -122,7 +133,7 @@ impl UnreducedEquations {
             .collect()
     }
 
-    /// Inverse dynamics: forces of the drives when every product has the value that `value` gives it.
+    /// Inverse dynamics: forces of the drives if every product has the value that `value` returns.
     pub(crate) fn inverse_dynamics(
         &self,
         graph: &mut Graph,
@@ -138,6 +149,7 @@ impl UnreducedEquations {
         self.drive_forces(graph, mechanism, &on_tree, value)
     }
 
+    /// Forces of the drives from generalised forces of the bodies on the open tree and from the effects.
     fn drive_forces(
         &self,
         graph: &mut Graph,
@@ -145,12 +157,14 @@ impl UnreducedEquations {
         on_tree: &[ExprId],
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<Vec<ExprId>, DeriveError> {
+        // Effects on the tree join the bodies; those along drives are added at the end.
         let effects = self.effect_forces(graph, mechanism, value)?;
         let on_tree: Vec<ExprId> = on_tree
             .iter()
             .zip(effects.on_tree)
             .map(|(a, b)| graph.add(*a, b))
             .collect();
+        // Constraint forces are eliminated here.
         let forces = self.projection.drive_forces(graph, &on_tree)?;
         Ok(forces
             .into_iter()
@@ -159,13 +173,14 @@ impl UnreducedEquations {
             .collect())
     }
 
-    /// Generalised forces of the independent coordinates for those of the open tree and for forces along the drives.
+    /// Generalised forces on the independent coordinates, from those of the open tree and from forces along the drives.
     pub(crate) fn project_on_active(
         &self,
         graph: &mut Graph,
         on_tree: &[ExprId],
         on_drives: &[ExprId],
     ) -> Vec<ExprId> {
+        // Forces along drives act through the Jacobian.
         let projected = self.projection.project(graph, on_tree);
         projected
             .into_iter()
@@ -180,17 +195,19 @@ impl UnreducedEquations {
             .collect()
     }
 
-    /// What effects ask for.
+    /// Forces of all effects for the parameter values that `value` returns.
     pub(crate) fn effect_forces(
         &self,
         graph: &mut Graph,
         mechanism: &Mechanism,
         value: &dyn Fn(&ParameterMonomial) -> ExprId,
     ) -> Result<EffectForces, DeriveError> {
+        // Sums over all effects.
         let mut on_tree = vec![Graph::ZERO; mechanism.coordinates.len()];
         let mut on_drives = vec![Graph::ZERO; mechanism.drives.len()];
         let value = |term: &EffectTerm| value(&ParameterMonomial(vec![(term.parameter.0, 1)]));
         for (effect, of_mechanics) in mechanism.effects.iter().zip(&self.of_mechanics) {
+            // Effects with mechanics act on the tree by their generalised forces.
             for by_term in of_mechanics {
                 for (term, factors) in effect.terms.iter().zip(by_term) {
                     let value = value(term);
@@ -203,9 +220,11 @@ impl UnreducedEquations {
             if effect.mechanics.is_some() {
                 continue;
             }
+            // All others act at their places, term by term.
             for (p, place) in effect.places.iter().enumerate() {
                 for term in &effect.terms {
                     let value = value(term);
+                    // A parameter of zero adds nothing.
                     if value == Graph::ZERO {
                         continue;
                     }
@@ -227,7 +246,8 @@ impl UnreducedEquations {
         Ok(EffectForces { on_tree, on_drives })
     }
 
-    /// What an effect's parameter multiplies at one of its places.
+    /// The factor of an effect's parameter at one of its places: the term's expression with the quantities of the
+    /// place.
     fn effect_factor(
         &self,
         graph: &mut Graph,
@@ -236,15 +256,16 @@ impl UnreducedEquations {
         at: usize,
         term: &EffectTerm,
     ) -> Result<ExprId, DeriveError> {
-        // With two places each is the other's other one.
+        // With two places, each is the other place of the other one.
         let place = effect.places[at];
         let other = match effect.places.as_slice() {
             [_, _] => Some(effect.places[1 - at]),
             _ => effect.other,
         };
+        // Quantities of the place and of the other place.
         let here = self.quantities(graph, place);
         let there = other.map_or([None; 4], |other| self.quantities(graph, other));
-        // An angle stands as itself, so that its sine is that of a joint.
+        // An angle is inserted as a coordinate, so that its sine is that of the joint.
         let mut expression = term.expression.clone();
         let named = [
             (Some(place), PlaceQuantity::Coordinate),
@@ -266,7 +287,7 @@ impl UnreducedEquations {
         })
     }
 
-    /// Coordinate, rate, acceleration and load of a place.
+    /// Coordinate, rate, acceleration and load of a place, where they exist.
     fn quantities(&self, graph: &mut Graph, place: EffectPlace) -> [Option<ExprId>; 4] {
         match place {
             EffectPlace::Drive(d) => {
@@ -295,7 +316,7 @@ impl UnreducedEquations {
     }
 }
 
-/// The angle by which a place turns, if it does.
+/// The angle of a revolute joint at a place; `None` for all other places.
 fn rotation_coordinate(mechanism: &Mechanism, place: EffectPlace) -> Option<CoordinateIdx> {
     let coordinate = match place {
         EffectPlace::Coordinate(i) => i,
@@ -307,6 +328,7 @@ fn rotation_coordinate(mechanism: &Mechanism, place: EffectPlace) -> Option<Coor
             return None;
         }
     };
+    // Lengths have no sine.
     let motion = mechanism.coordinates[coordinate.0].motion;
     motion.is_angle().then_some(coordinate)
 }

@@ -1,4 +1,5 @@
 //! From p_g to p_min: products, dependencies and base parameters, eq. (5), (6) and (16).
+//! A derivation goes in; the page gets the tables and equations of its last three sections.
 
 use modelmill_spec::Mechanism;
 
@@ -17,7 +18,7 @@ use crate::reduce::base::{
 use crate::reduce::{RationalFunction, ReductionMethod};
 use crate::tree::expressions::ParameterMonomial;
 
-/// Base parameter `k` written out term by term: what a script reads.
+/// Base parameter `k` expanded term by term, without parentheses: the form that a script reads.
 pub fn base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
     expanded_formula(&derivation.mechanism, &derivation.reduction, k)
 }
@@ -29,15 +30,19 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         reduction,
         ..
     } = derivation;
+    // The retained product has the factor 1 and comes first.
     let mut terms = vec![product(
         mechanism,
         &reduction.products[reduction.retained[k]],
     )];
+    // Lumped products grouped by their common function of the constants: per function pairs of a number and a product.
     let mut groups: Vec<(RationalFunction, Vec<(Rational, PrintedFormula)>)> = Vec::new();
     for (at, line) in reduction.dependencies.iter().enumerate() {
         let what =
             PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
+        // The numeric content of a factor is split off, so that factors that differ by a number only share a group.
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
+            // Equal functions are found by comparison, since there are few.
             let (number, function) = factor.split_number();
             let member = (number, what.clone());
             match groups.iter_mut().find(|(f, _)| *f == function) {
@@ -46,8 +51,10 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
             }
         }
     }
+    // One term per group: number * function * (sum of products).
     for (function, mut members) in groups {
         let factor = function.formula(mechanism);
+        // The greatest common content of the numbers stands in front; the first term in parentheses is positive.
         let mut number = members
             .iter()
             .fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
@@ -61,14 +68,17 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         let sum = members
             .into_iter()
             .map(|(k, what)| PrintedFormula::product(k, [what]));
+        // number * function * sum
         let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
         terms.push(term);
     }
     PrintedFormula::sum(terms)
 }
 
-/// What a product of p_g, by its position, brings into base parameter `k`: `d1*m2`, with its factor of eq. (6). A product that
-/// goes by others, as in long chains, stands alone, since its factor is longer than what it would tell; so does the retained one.
+/// The summand of base parameter `k` that belongs to the product of p_g at `product_idx`: `d1*m2`, with its factor of
+/// eq. (6).
+/// Without factor are the retained product and, in long chains, products that depend on other dependent ones,
+/// whose factors are too long to read.
 pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> PrintedFormula {
     let Derivation {
         mechanism,
@@ -77,6 +87,7 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Pr
     } = derivation;
     let what = product(mechanism, &reduction.products[product_idx]);
     let mut lines = reduction.dependencies.iter();
+    // A line without `via` gives the factor directly.
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
@@ -87,7 +98,7 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Pr
     }
 }
 
-/// A factor of eq. (6) as expanded text.
+/// A factor of eq. (6) as expanded infix text.
 pub(super) fn factor_text(mechanism: &Mechanism, factor: &RationalFunction) -> String {
     factor.expanded_formula(mechanism).text()
 }
@@ -97,13 +108,14 @@ fn column_symbol(mechanism: &Mechanism, of: &ParameterMonomial) -> PrintedFormul
     PrintedFormula::Indexed(FormulaSymbol::new("h"), Box::new(product(mechanism, of)))
 }
 
-/// p_g with units, and what has no effect.
+/// The section of p_g: a table of the products with unit and nominal value, and a list of products without effect.
 pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         reduction,
         ..
     } = derivation;
+    // The model that the table belongs to comes first.
     page.heading("Products of dynamic parameters");
     let mut line = vec![text(
         "The forces of the drives are linear in products of dynamic parameters, eq. (5): ",
@@ -115,18 +127,21 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     line.push(name("H"));
     line.push(text(" belongs to one product."));
     page.paragraph(line);
+    // Nominal values of single parameters; the value of a product follows from them.
     let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| p.nominal).collect();
+    // One row per product of p_g.
     let rows = reduction
         .products
         .iter()
         .enumerate()
+        // The last cell names the base parameter of a retained product.
         .map(|(k, m)| {
             let fate = match reduction.retained.iter().position(|r| *r == k) {
                 Some(at) => vec![
                     text("retained, "),
                     InlineSpan::Math(PrintedFormula::name(base_name(at))),
                 ],
-                None => cell(text("follows from retained columns")),
+                None => cell(text("depends on retained columns")),
             };
             vec![
                 cell(text((k + 1).to_string())),
@@ -144,8 +159,11 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
             rows,
         },
     );
+    // Products without effect are listed, so that a reader does not look for them in the table.
     if !reduction.without_effect.is_empty() {
-        let mut line: TextLine = vec![text("Without any effect on the drives, and so left out: ")];
+        let mut line: TextLine = vec![text(
+            "These products do not affect the drives and are left out: ",
+        )];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
@@ -157,41 +175,48 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     }
 }
 
-/// Eq. (6).
+/// The section of eq. (6): the columns that are combinations of retained ones, and how they were found.
 pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
         reduction,
         ..
     } = derivation;
+    // Without dependencies one sentence is enough.
     page.heading("Dependent columns");
     if reduction.dependencies.is_empty() {
         let mut says =
             "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
         if let Some(caution) = reduction.method.caution() {
-            says = format!("{says} Beware: {caution}.");
+            says = format!("{says} Caution: {caution}.");
         }
         page.paragraph([text(says)]);
         return;
     }
+    // How the dependencies were found decides for which values of the constants they are valid.
     page.paragraph([text(match &reduction.method {
         ReductionMethod::Exact { confirmed_at, .. } => format!(
-            "Columns that are constant combinations of retained ones at every state, eq. (6). \
+            "The following columns are constant combinations of retained columns at every state, eq. (6). \
              They were found in exact arithmetic and confirmed at {confirmed_at} further states with other values of the constants."
         ),
         ReductionMethod::Unreduced => "Columns are not reduced.".to_owned(),
         ReductionMethod::Numeric { least_kept, most_dropped, residual, because } => format!(
-            "Columns that are constant combinations of retained ones, eq. (6), found numerically on the values of this file: \
-             {because}. The factors are rounded, and base and factors hold for these values alone. \
-             Of every retained column the others leave at least {least_kept:.1e}, of every dependent one at most {most_dropped:.1e}; \
-             at further states the factors leave at most {residual:.1e} of a column."
+            "The following columns are constant combinations of retained columns, eq. (6). \
+             They were found numerically with the values of this file: {because}. \
+             The factors are rounded; base and factors are valid for these values only. \
+             In the span of the other columns, every retained column has a residual of at least {least_kept:.1e} of its size, \
+             every dependent one of at most {most_dropped:.1e}. \
+             At further states the residual of eq. (6) is at most {residual:.1e} of a column."
         ),
     })]);
+    // One equation per dependent column: factors times retained columns, or times dependent ones with lines of their
+    // own.
     let lines = reduction
         .dependencies
         .iter()
         .enumerate()
         .map(|(i, line)| PageEquation {
+            // The dependent column.
             left: column_symbol(mechanism, &reduction.products[line.product]),
             right: {
                 let retained = line.equals.iter();
@@ -209,7 +234,8 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     page.equations("dependent columns", lines);
 }
 
-/// Eq. (16).
+/// The section of eq. (16): the base parameters as formulas and their nominal values.
+/// `numeric` is the rank on the file's values, which is compared with the exact one.
 pub(super) fn base_parameters(
     page: &mut PageDocument,
     derivation: &Derivation,
@@ -220,6 +246,7 @@ pub(super) fn base_parameters(
         reduction,
         ..
     } = derivation;
+    // A sentence with the rank, then the equations, then the values.
     page.heading("Base parameters");
     let rank = reduction.retained.len();
     let mut line = vec![text(format!(
@@ -228,14 +255,16 @@ pub(super) fn base_parameters(
     ))];
     line.extend(linear_model("H_min", "p_min"));
     line.push(text("."));
+    // The numeric check, if the caller has made it.
     if let Some(n) = numeric {
+        // A smaller numeric rank means a special geometry.
         let verdict = if n.rank == rank {
-            ", the same"
+            ", as derived"
         } else {
-            ": this geometry is special, and some base parameters cannot be told apart"
+            "; this geometry is special, and some base parameters are indistinguishable"
         };
         line.push(text(format!(
-            " On the file's values the numeric rank of eq. (9) over {} states is {}{verdict}.",
+            " Numeric check of eq. (9) with the file's values at {} random states: rank {}{verdict}.",
             n.samples, n.rank
         )));
         if let Some(condition) = n.condition {
@@ -243,6 +272,7 @@ pub(super) fn base_parameters(
         }
     }
     page.paragraph(line);
+    // The unit of a base parameter is that of its retained product.
     let equation = |k: usize, right: PrintedFormula| PageEquation {
         left: PrintedFormula::name(base_name(k)),
         right,
@@ -252,10 +282,11 @@ pub(super) fn base_parameters(
             &reduction.products[reduction.retained[k]],
         )),
     };
+    // Long chains have named sums, because base parameters without them would be too long to read.
     let sums = dependent_sums(mechanism, reduction);
     if !sums.is_empty() {
         page.paragraph([text(
-            "Products that others go by stand with these, link by link (Gautier and Khalil 1990):",
+            "Named sums: a dependent product together with the products that are expressed by it, link by link (Gautier and Khalil 1990):",
         )]);
         let sums = sums
             .into_iter()
@@ -268,10 +299,12 @@ pub(super) fn base_parameters(
             });
         page.equations("sums", sums.collect());
     }
+    // Factored forms, which are shorter than the expanded ones that scripts read.
     let grouped = (0..rank)
         .map(|k| equation(k, factored_base_expression(derivation, k)))
         .collect();
     page.equations("base parameters", grouped);
+    // Identified values where the file has them, nominal ones otherwise.
     let values = derivation.nominal_base_values();
     let rows = (0..rank)
         .map(|k| {
@@ -299,6 +332,7 @@ pub(super) fn base_parameters(
 }
 
 /// A number with six significant digits.
+/// Printed with at most six digits; rounding is done in decimal, so that the text has no trailing digits.
 struct RoundedNumber(f64);
 
 impl std::fmt::Display for RoundedNumber {

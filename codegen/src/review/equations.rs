@@ -8,7 +8,7 @@ use super::rank::NumericRank;
 use crate::reduce::base::base_parameter_name as base_name;
 use crate::{BaseReduction, Derivation, OperationCount, ProgramStage, ReductionMethod};
 
-/// Everything that reduction says about a model.
+/// The reduction of a model in texts and counts: products, dependencies, base parameters.
 #[derive(Clone, Debug)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct ReducedEquations {
@@ -41,7 +41,7 @@ pub struct ReducedEquations {
 pub struct DependencyLine {
     /// The product whose column it is.
     pub parameter: String,
-    /// Retained products with their factors, and other dependent ones that stand for what they equal in turn.
+    /// Products and their factors: retained ones, and dependent ones, which stand for their own combinations.
     #[cfg_attr(any(test, feature = "json"), serde(serialize_with = "as_map"))]
     pub equals: Vec<(String, String)>,
 }
@@ -58,17 +58,17 @@ pub struct BaseParameterLine {
     pub expression: String,
 }
 
-/// Ranks.
+/// Ranks of the regressor: exact and numeric.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct RankSummary {
-    /// By exact reduction, for any geometry but special ones; none where columns were reduced numerically.
+    /// By exact reduction, valid for generic geometry; `None` where columns were reduced numerically.
     pub exact: Option<usize>,
-    /// Of eq. (9) on the file's values.
+    /// Numeric rank of eq. (9), the regressors stacked over random states, on the file's values.
     pub numeric: Option<usize>,
-    /// States of which eq. (9) was made.
+    /// Number of random states in eq. (9).
     pub samples: Option<usize>,
-    /// How columns were reduced where that was done numerically.
+    /// The method, where columns were reduced numerically.
     #[cfg_attr(
         any(test, feature = "json"),
         serde(skip_serializing_if = "Option::is_none")
@@ -80,17 +80,17 @@ pub struct RankSummary {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct NumericMethod {
-    /// `numeric`.
+    /// Always `numeric`.
     pub name: &'static str,
     /// How many columns are retained.
     pub rank: usize,
     /// Why columns could not be reduced in symbols.
     pub because: String,
-    /// What the others leave of the retained column that is nearest to being dependent, relative to its size.
+    /// Smallest residual of a retained column in the span of the others, relative to its size.
     pub least_kept: f64,
-    /// The same for the dependent column that is furthest from it.
+    /// Largest such residual of a dependent column.
     pub most_dropped: f64,
-    /// What the factors leave of a dependent column at further states, relative to its terms: the most of all.
+    /// Largest residual of eq. (6) for a dependent column at further states, relative to the size of its terms.
     pub residual: f64,
 }
 
@@ -121,14 +121,16 @@ impl NumericMethod {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(any(test, feature = "json"), derive(Serialize))]
 pub struct ProgramOperations {
-    /// H_min.
+    /// The regressor H_min.
     pub regressor: OperationCount,
     /// Inverse dynamics with p_min.
     pub inverse_dynamics: OperationCount,
 }
 
+/// Pairs as a JSON object, in their order.
 #[cfg(any(test, feature = "json"))]
 fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S::Ok, S::Error> {
+    // The order of the pairs is kept.
     let mut map = serializer.serialize_map(Some(pairs.len()))?;
     for (key, value) in pairs {
         map.serialize_entry(key, value)?;
@@ -137,15 +139,18 @@ fn as_map<S: Serializer>(pairs: &[(String, String)], serializer: S) -> Result<S:
 }
 
 impl ReducedEquations {
-    /// Collects the equations of a derivation.
+    /// Collects texts and counts of a derivation. `numeric` adds the rank on the file's values.
     pub fn new(derivation: &Derivation, numeric: Option<&NumericRank>) -> Self {
+        // The fields that the equations are printed from.
         let Derivation {
             mechanism,
             reduction,
             programs,
             ..
         } = derivation;
+        // Text of the product at an index of p_g.
         let product = |k: usize| reduction.products[k].text(mechanism);
+        // Retained and dependent products on the right are listed alike, retained ones first.
         let dependent = reduction.dependencies.iter().map(|line| DependencyLine {
             parameter: product(line.product),
             equals: line
@@ -161,6 +166,7 @@ impl ReducedEquations {
             .iter()
             .map(|m| m.text(mechanism))
             .collect();
+        // Products without effect are lines with nothing on the right.
         let vanishing = without_effect.iter().map(|parameter| DependencyLine {
             parameter: parameter.clone(),
             equals: Vec::new(),
@@ -169,6 +175,7 @@ impl ReducedEquations {
             model: mechanism.name.clone(),
             parameters: (0..reduction.products.len()).map(product).collect(),
             dependencies: dependent.chain(vanishing).collect(),
+            // Named sums exist only where base parameters are long.
             sums: derivation.base_sums(),
             base: (0..reduction.retained.len())
                 .map(|k| BaseParameterLine {
@@ -177,13 +184,16 @@ impl ReducedEquations {
                     expression: base_expression(derivation, k).text(),
                 })
                 .collect(),
+            // Exact rank only if the reduction was exact.
             rank: RankSummary {
                 exact: matches!(reduction.method, ReductionMethod::Exact { .. })
+                    // A numeric reduction states its rank with its method, so that it is not taken for an exact one.
                     .then_some(reduction.retained.len()),
                 numeric: numeric.map(|n| n.rank),
                 samples: numeric.map(|n| n.samples),
                 method: NumericMethod::from_reduction(reduction),
             },
+            // Operations of a state; precomputed values are not counted.
             operations: ProgramOperations {
                 regressor: programs.regressor.count_operations(ProgramStage::State),
                 inverse_dynamics: programs
@@ -199,6 +209,7 @@ impl ReducedEquations {
     pub fn json(&self) -> String {
         let mut text =
             serde_json::to_string_pretty(self).expect("strings and counts always make JSON");
+        // A text file ends with a line feed.
         text.push('\n');
         text
     }

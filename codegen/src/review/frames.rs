@@ -1,3 +1,4 @@
+//! A `Mechanism` goes in; the page gets the sections that describe geometry and masses as the model file states them.
 //! Tables of frames, points, bodies and lumped masses.
 
 use modelmill_spec::{
@@ -9,10 +10,12 @@ use super::document::{InlineSpan, PageBlock, PageDocument, PageTable, TextLine, 
 use crate::expr::Rational;
 use crate::expr::print::{PrintedFormula, angle_formula, exact_formula, length_formula};
 
-/// Frames and points.
+/// The section of frames: Denavit-Hartenberg tables, one per convention, then transforms, then points.
 pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Frames");
+    // The frame on which another one is mounted.
     let on = |frame: &ModelFrame| code(&*mechanism.frames[frame.parent.0].name);
+    // The base frame at index 0 has no row.
     for (title, standard) in [
         (
             "Modified Denavit-Hartenberg parameters: Rx(alpha) Tx(a) Rz(theta) Tz(d) leads from a frame to the next.",
@@ -23,6 +26,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
             true,
         ),
     ] {
+        // One table per convention, with the frames that use it.
         let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
             .iter()
             .filter(|frame| match frame.convention {
@@ -36,6 +40,7 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
                 row
             })
             .collect();
+        // A convention that no frame uses has no table.
         if rows.is_empty() {
             continue;
         }
@@ -43,13 +48,17 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
         let head = vec!["frame", "on", "a", "alpha", "d", "theta"];
         page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
+    // Frames that are given by single rotations and translations.
     let rows: Vec<Vec<TextLine>> = mechanism.frames[1..]
         .iter()
         .filter(|frame| matches!(frame.convention, FrameConvention::Transform(_)))
+        // Each step is written as `Rx(...)`, `Tz(...)`, in the order in which the file has them.
         .map(|frame| {
             let mut steps: TextLine = Vec::new();
             for step in &frame.steps {
+                // Kind, axis and amount of one step.
                 let (letter, axis, by) = match step {
+                    // A floating body is described in words.
                     FrameStep::Free(body) => {
                         steps.extend(free_body_motion(mechanism, body));
                         continue;
@@ -57,29 +66,33 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
                     FrameStep::Rotate(axis, by) => ("R", axis, angle_formula(mechanism, by)),
                     FrameStep::Translate(axis, by) => ("T", axis, length_formula(mechanism, by)),
                 };
+                // The letter of the axis becomes part of the name: `Rx`, `Tz`.
                 let axis = match axis {
                     FrameAxis::X => "x",
                     FrameAxis::Y => "y",
                     FrameAxis::Z => "z",
                 };
+                // Steps are separated by blanks.
                 let space = if steps.is_empty() { "" } else { " " };
                 steps.push(text(format!("{space}{letter}{axis}(")));
                 steps.push(InlineSpan::Math(by));
                 steps.push(text(")"));
             }
+            // A frame without steps coincides with its parent.
             if steps.is_empty() {
-                steps.push(text("the same place"));
+                steps.push(text("identity"));
             }
             vec![cell(code(&*frame.name)), cell(on(frame)), steps]
         })
         .collect();
     if !rows.is_empty() {
         page.paragraph([text(
-            "Transforms, each rotation and translation about and along the axes reached so far.",
+            "Transforms: each rotation is about, and each translation along, the axes of the frame reached so far.",
         )]);
         let head = vec!["frame", "on", "transform"];
         page.blocks.push(PageBlock::Table(PageTable { head, rows }));
     }
+    // Points with their frames and positions.
     let rows: Vec<Vec<TextLine>> = mechanism
         .points
         .iter()
@@ -98,14 +111,17 @@ pub(super) fn frames(page: &mut PageDocument, mechanism: &Mechanism) {
     }
 }
 
-/// What a body that hangs on nothing moves by.
+/// The coordinates of a floating body and the axes in which its velocities and forces are given.
 fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
+    // Names of the coordinates as a list.
     let names = |all: &[CoordinateIdx]| {
         let names = all.iter().map(|i| mechanism.coordinates[i.0].name.as_str());
         names.collect::<Vec<_>>().join(", ")
     };
+    // The axes in words.
     let axes = |axes| match axes {
         TwistAxes::Body => "the body's axes",
+        // Linear and angular quantities may use different axes.
         TwistAxes::World => "the base's axes",
     };
     vec![
@@ -121,14 +137,17 @@ fn free_body_motion(mechanism: &Mechanism, body: &FreeBody) -> TextLine {
     ]
 }
 
-/// a, alpha, d, theta of a frame in a Denavit-Hartenberg convention.
+/// Lengths a and d (m), angles alpha and theta (rad), in the order a, alpha, d, theta.
+/// Steps about or along the same axis are summed.
 fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 4] {
+    // The angle about an axis.
     let rotation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
             FrameStep::Rotate(axis, by) if *axis == wanted => Some(angle_formula(mechanism, by)),
             _ => None,
         }))
     };
+    // The length along an axis.
     let translation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
             FrameStep::Translate(axis, by) if *axis == wanted => {
@@ -138,6 +157,7 @@ fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 
         }))
     };
     [
+        // The convention has a along x, alpha about x, d along z and theta about z.
         translation(FrameAxis::X),
         rotation(FrameAxis::X),
         translation(FrameAxis::Z),
@@ -145,6 +165,7 @@ fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 
     ]
 }
 
+/// A vector with three components, in parentheses.
 fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
     let mut line = vec![text("(")];
     for (i, x) in at.iter().enumerate() {
@@ -157,7 +178,7 @@ fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
     line
 }
 
-/// The entries of an inertia that are not zero, with their places.
+/// The entries of an inertia that are not zero, each after its name, or `0`.
 fn inertia_entries(
     mechanism: &Mechanism,
     names: [&str; 6],
@@ -165,6 +186,7 @@ fn inertia_entries(
 ) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
+        // Most inertias have few entries.
         if value.is_zero() {
             continue;
         }
@@ -180,17 +202,20 @@ fn inertia_entries(
     line
 }
 
+/// Entries of a symmetric matrix in the order of the model file.
 const PLACES: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 
-/// Parts and lumped masses.
+/// The section of bodies: parts given about their centre of mass, parts given linearly, lumped masses.
 pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     page.heading("Bodies");
     let (mut about_centre, mut linear) = (Vec::new(), Vec::new());
     for part in &mechanism.parts {
+        // Name and frame of a part.
         let start = vec![
             cell(text(&*part.name)),
             cell(code(&*mechanism.frames[part.frame.0].name)),
         ];
+        // Both forms have the same three columns, but the meaning of the last two differs, so each has a table.
         let (rows, mass, place, inertia) = match &part.inertial {
             PartInertia::AboutCentre {
                 mass,
@@ -203,15 +228,17 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
                 inertia,
             } => (&mut linear, mass, first_moment, inertia),
         };
+        // Mass, centre or first moment, and inertia.
         let mut row = start;
         row.push(cell(InlineSpan::Math(exact_formula(mechanism, mass))));
         row.push(vector(mechanism, place));
         row.push(inertia_entries(mechanism, PLACES, inertia));
         rows.push(row);
     }
+    // Each form has its own table, because the third and fourth columns differ.
     if !about_centre.is_empty() {
         page.paragraph([text(
-            "Parts by mass, centre of mass, and inertia about the centre along the frame's axes; what is not listed is zero.",
+            "Parts by mass, centre of mass, and inertia about the centre of mass in the frame's axes. Entries not listed are zero.",
         )]);
         let head = vec!["part", "frame", "mass, kg", "centre, m", "inertia, kg m²"];
         page.table(
@@ -224,7 +251,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     }
     if !linear.is_empty() {
         page.paragraph([text(
-            "Parts by mass, first moment, and inertia about the frame's origin; what is not listed is zero.",
+            "Parts by mass, first moment, and inertia about the frame's origin. Entries not listed are zero.",
         )]);
         let head = vec![
             "part",
@@ -238,22 +265,26 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
     lumped_masses(page, mechanism);
 }
 
+/// The table of lumped masses: a share of a mass at a point for forces and at a point for moments.
 fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
     if mechanism.lumped_masses.is_empty() {
         return;
     }
     page.paragraph([text("Lumped masses.")]);
+    // Number of masses that act at two different points.
     let mut apart = 0;
     let rows = mechanism
         .lumped_masses
         .iter()
         .map(|lump| {
+            // The share is exact, such as 1/2 of a rod's mass.
             let share = Rational::from(lump.share.clone());
             let mass = PrintedFormula::product(share, [exact_formula(mechanism, &lump.mass)]);
+            // Usually both balances use the same point.
             let same = lump.force_at == lump.moment_at;
             apart += usize::from(!same);
             let moment = if same {
-                cell(text("the same place"))
+                cell(text("the same point"))
             } else {
                 vector(mechanism, &lump.moment_at)
             };
@@ -268,19 +299,21 @@ fn lumped_masses(page: &mut PageDocument, mechanism: &Mechanism) {
     let head = vec![
         "mass, kg",
         "frame",
-        "the balance of forces sees it at, m",
-        "the balance of moments sees it at, m",
+        "point in the balance of forces, m",
+        "point in the balance of moments, m",
     ];
     page.table("lumped masses", PageTable { head, rows });
+    // Such a mass belongs to a simplified model and not to a rigid body, which a reader has to know.
     if apart > 0 {
+        // The noun in singular or plural.
         let n = if apart == 1 {
             "one mass".to_owned()
         } else {
             format!("{apart} masses")
         };
         page.paragraph([text(format!(
-            "Note: the balance of forces and the balance of moments see {n} at different places. \
-             This is no rigid body; the file asks for it."
+            "Note: the balance of forces and the balance of moments use different points for {n}. \
+             This is not a rigid body; the model file states it so."
         ))]);
     }
 }

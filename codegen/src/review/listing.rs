@@ -1,28 +1,32 @@
-//! A straight-line program as numbered equations: what is used once is put in place, what is shared gets a name.
+//! A straight-line program as numbered equations. Intermediate values used more than once get names; the others are
+//! inline.
+//! A `StraightLineProgram` and names for known quantities go in, `ProgramListing` comes out.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_spec::Mechanism;
 
 use super::document::PageEquation;
-use crate::emit::tree::names::QuantityName;
 use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, FormulaSymbol, PrintedFormula, atom};
 use crate::lower::{ProgramOp, ProgramStage, StraightLineProgram};
+use crate::names::QuantityName;
 
-/// Equations of a program.
+/// Equations of a program by stage, in the order of computation.
 pub(super) struct ProgramListing {
-    /// What is computed once per geometry.
+    /// Equations that are evaluated once per geometry.
     pub(super) fixed: Vec<PageEquation>,
-    /// What is computed at every state, outputs at the end.
+    /// Equations that are evaluated at every state, outputs at the end.
     pub(super) state: Vec<PageEquation>,
 }
 
-/// Formulas with more leaves get lines of their own.
+/// Formulas with more leaves than this get a line of their own, even if they are used once.
 const MOST_LEAVES: usize = 16;
 
-/// Lists a program. `names` are those of values that mean something, `reserved` those that are taken,
-/// `outputs` those of the outputs, `prefix` begins every tag.
+/// Lists a program.
+///
+/// `names` are the symbols of known quantities by value index, `reserved` are names that may not be used, `outputs` are
+/// the symbols of the outputs in order, and `prefix` begins every tag.
 pub(super) fn list_program(
     program: &StraightLineProgram,
     mechanism: &Mechanism,
@@ -31,6 +35,7 @@ pub(super) fn list_program(
     outputs: &[FormulaSymbol],
     prefix: &str,
 ) -> ProgramListing {
+    // How often a value is used decides whether it gets a name.
     let uses = count_uses(program);
     let mut lister = ListingBuilder {
         mechanism,
@@ -43,16 +48,25 @@ pub(super) fn list_program(
             state: Vec::new(),
         },
     };
+    // Names of quantities and outputs are taken before any name is generated.
     lister.taken.extend(names.values().map(|m| m.symbol.text()));
+    // Symbols of outputs are taken as well.
     lister.taken.extend(outputs.iter().map(FormulaSymbol::text));
+    // Whether a value is an output.
     let is_output = |i: usize| program.outputs.iter().any(|o| o.index() == i);
+    // Values in order: each becomes a formula, and an equation if it gets a name.
     for (i, op) in program.ops.iter().enumerate() {
+        // Unused values keep a place, so that indices stay aligned.
         if uses[i].count == 0 {
             lister.formulas.push(PrintedFormula::integer(0));
             continue;
         }
+        // The formula with operands inlined or named.
         let formula = lister.formula(op);
+        // A single name or number needs no name of its own.
         let simple = count_leaves(&formula) < 2;
+        // Whether the value gets a name, and which: known quantity, sine or cosine, shared, long, or used by a later
+        // stage.
         let wanted = match op {
             ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => None,
             _ if names.contains_key(&i) => Some(names[&i].symbol.clone()),
@@ -62,6 +76,7 @@ pub(super) fn list_program(
             _ if simple => None,
             // An output used nowhere else is written where the outputs are.
             _ if is_output(i) && uses[i].count == 1 => None,
+            // Functions always have a line of their own, because their arguments are long.
             ProgramOp::Atan2(..) | ProgramOp::Unary(..) => {
                 Some(lister.next_symbol(program.stages[i]))
             }
@@ -73,7 +88,9 @@ pub(super) fn list_program(
             }
             _ => None,
         };
+        // A named value becomes an equation, all others stay formulas.
         match wanted {
+            // The named quantity may be the negative of this value; then the equation and its uses change sign.
             Some(symbol) => {
                 let negative = names.get(&i).is_some_and(|m| m.negative);
                 let turned = |f: PrintedFormula| if negative { f.negate() } else { f };
@@ -83,12 +100,14 @@ pub(super) fn list_program(
             None => lister.formulas.push(formula),
         }
     }
+    // Outputs that are not yet the left side of an equation get one.
     for (symbol, value) in outputs.iter().zip(&program.outputs) {
         let formula = lister.formulas[value.index()].clone();
         if formula != PrintedFormula::Symbol(symbol.clone()) {
             lister.add_equation(ProgramStage::State, symbol.clone(), formula);
         }
     }
+    // Numbers run through both stages.
     let ProgramListing { fixed, state } = &mut lister.listing;
     for (i, equation) in fixed.iter_mut().chain(state).enumerate() {
         equation.tag = format!("{prefix}{}", i + 1);
@@ -96,20 +115,23 @@ pub(super) fn list_program(
     lister.listing
 }
 
+/// How a value is used.
 #[derive(Clone, Copy, Default)]
 struct ValueUses {
+    /// Number of uses by needed operations and by outputs.
     count: usize,
-    /// Whether something that is computed at every state uses it.
+    /// Whether an operation that is evaluated at every state uses it.
     by_state: bool,
 }
 
-/// How often each value is used by what is needed.
+/// Uses per value, counted backwards from the outputs; unneeded operations count for nothing.
 fn count_uses(program: &StraightLineProgram) -> Vec<ValueUses> {
     let mut uses = vec![ValueUses::default(); program.ops.len()];
     for output in &program.outputs {
         uses[output.index()].count += 1;
     }
     for i in (0..program.ops.len()).rev() {
+        // Operations that nothing needs do not count as users.
         if uses[i].count == 0 {
             continue;
         }
@@ -123,20 +145,26 @@ fn count_uses(program: &StraightLineProgram) -> Vec<ValueUses> {
     uses
 }
 
+/// State of the listing while values are visited in order.
 struct ListingBuilder<'a> {
+    /// For the names of inputs.
     mechanism: &'a Mechanism,
+    /// Names that may not be generated again.
     taken: BTreeSet<String>,
-    /// Per operation what stands for its value.
+    /// Per value the formula or the symbol by which later equations refer to it.
     formulas: Vec<PrintedFormula>,
-    /// Names of angles whose sine or cosine was taken.
+    /// Names of angles whose sine or cosine has been named, by value index.
     angles: BTreeMap<usize, String>,
-    /// Numbers given to nameless values of either stage.
+    /// Counters of generated names: `k1`, `k2`, ... and `x1`, `x2`, ...
     next: [usize; 2],
+    /// The equations so far; tags are set at the end.
     listing: ProgramListing,
 }
 
 impl ListingBuilder<'_> {
+    /// Appends `left = right` to the equations of the stage.
     fn add_equation(&mut self, stage: ProgramStage, left: FormulaSymbol, right: PrintedFormula) {
+        // The tag is not known before the listing is complete.
         let equation = PageEquation {
             left: PrintedFormula::Symbol(left),
             right,
@@ -151,10 +179,12 @@ impl ListingBuilder<'_> {
 
     /// A name for a value without a meaning of its own: k1, k2, ... once per geometry, x1, x2, ... at every state.
     fn next_symbol(&mut self, stage: ProgramStage) -> FormulaSymbol {
+        // Numbers of both stages are independent.
         let (letter, counter) = match stage {
             ProgramStage::Fixed => ("k", 0),
             ProgramStage::State => ("x", 1),
         };
+        // A number that the model uses as a name is skipped.
         loop {
             self.next[counter] += 1;
             let name = format!("{letter}{}", self.next[counter]);
@@ -164,13 +194,15 @@ impl ListingBuilder<'_> {
         }
     }
 
-    /// `s_theta1`, `c_theta1`, ...
+    /// A symbol for a sine or cosine: `s_theta1`, `c_theta1`, ... An angle that is no sum of names is numbered.
     fn trigonometric_symbol(&mut self, op: &ProgramOp, angle: usize) -> FormulaSymbol {
+        // The same angle may have a sine and a cosine.
         let letter = if matches!(op, ProgramOp::Sin(_)) {
             "s"
         } else {
             "c"
         };
+        // The name of an angle is the same for its sine and cosine.
         if !self.angles.contains_key(&angle) {
             let name = angle_name(&self.formulas[angle])
                 .unwrap_or_else(|| format!("angle{}", self.angles.len() + 1));
@@ -183,7 +215,9 @@ impl ListingBuilder<'_> {
         FormulaSymbol::new(name)
     }
 
+    /// The formula of an operation, with the formulas of its operands in place.
     fn formula(&self, op: &ProgramOp) -> PrintedFormula {
+        // Operands as formulas or symbols.
         let at = |v: &crate::ValueId| self.formulas[v.index()].clone();
         match op {
             ProgramOp::Number(n) => PrintedFormula::Number(n.clone()),
@@ -206,7 +240,7 @@ impl ListingBuilder<'_> {
     }
 }
 
-/// How many names and numbers a formula has.
+/// Number of names, numbers and function calls in a formula: a measure of its length.
 fn count_leaves(formula: &PrintedFormula) -> usize {
     match formula {
         PrintedFormula::Number(_) | PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) => 1,
@@ -216,6 +250,7 @@ fn count_leaves(formula: &PrintedFormula) -> usize {
             above,
             below,
         } => {
+            // A factor of one is not printed.
             let number = usize::from(!factor.abs().is_one());
             number + above.iter().chain(below).map(count_leaves).sum::<usize>()
         }
@@ -224,7 +259,7 @@ fn count_leaves(formula: &PrintedFormula) -> usize {
     }
 }
 
-/// The names of an angle's summands in a row; `None` if it is no sum of names.
+/// The names of an angle's summands, joined by `_`; `None` if the angle is no sum of names with integer factors.
 fn angle_name(formula: &PrintedFormula) -> Option<String> {
     match formula {
         PrintedFormula::Symbol(symbol) => Some(symbol.text()),
@@ -240,6 +275,7 @@ fn angle_name(formula: &PrintedFormula) -> Option<String> {
             let [PrintedFormula::Symbol(symbol)] = above.as_slice() else {
                 return None;
             };
+            // An integer factor is part of the name: `2theta1`, `mtheta1` for minus.
             let (n, d) = factor.as_small()?;
             let sign = if n < 0 { "m" } else { "" };
             let count = match n.unsigned_abs() {

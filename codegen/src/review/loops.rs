@@ -1,4 +1,5 @@
-//! Loops and drives: closure equations, how they are solved, and what the drives see.
+//! The sections of loops and drives: closure equations, how they are solved, drive lengths and the Jacobian of the
+//! drives.
 
 use modelmill_spec::{DriveKind, Mechanism, PlaceLoad};
 
@@ -12,6 +13,7 @@ use crate::{Derivation, PassivePosition};
 /// Expressions with more nodes than this are shown in a program rather than in one line.
 const LONGEST: usize = 70;
 
+/// Names of coordinates as a list: `a, b and c`.
 fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
     let mut line = TextLine::new();
     for (i, c) in coordinates.iter().enumerate() {
@@ -29,11 +31,12 @@ fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
     line
 }
 
+/// The formula of an expression, or `None` if it is too long for a line.
 fn short_formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> Option<PrintedFormula> {
     (tree_size(graph, id, LONGEST) < LONGEST).then(|| formula(graph, mechanism, id))
 }
 
-/// Closure equations and the way from the active to the passive coordinates.
+/// Adds couplings, closure equations, and the solution for the passive coordinates.
 pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -42,15 +45,19 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         equations,
         ..
     } = derivation;
+    // Couplings have a section of their own, which a mechanism without loops has as well.
     let projection = &equations.projection;
     list_couplings(page, derivation);
     if mechanism.loops.is_empty() {
         return;
     }
     page.heading("Loops");
+    // The tag counts all closure equations, so that a missing number shows that a long one was left out.
     let mut tag = 0;
     for (l, closure) in mechanism.loops.iter().zip(&projection.loops.closures) {
+        // The two points that coincide.
         let [a, b] = l.joins.map(|p| code(&*mechanism.points[p.0].name));
+        // A chain of links exists for planar loops only.
         let plane = if closure.chain.is_some() {
             "; the loop is planar"
         } else {
@@ -65,6 +72,7 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             b,
             text(format!(" coincide{plane}.")),
         ]);
+        // Equations that fit into a line.
         let lines = closure
             .residual
             .iter()
@@ -80,19 +88,23 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             .collect();
         page.equations("closure equations", lines);
     }
+    // How the passive coordinates are computed: not at all, in closed form, or iteratively.
     match &programs.passive_position {
         PassivePosition::None => {}
+        // Closed form: the steps of the solution.
         PassivePosition::Closed => list_closed_form(page, derivation),
+        // Iterative: the list of the coordinates is enough.
         PassivePosition::Newton { .. } => {
             let mut line = vec![text("The passive coordinates ")];
             line.extend(coordinate_names(mechanism, &projection.loops.passive));
             line.push(text(
-                " follow by Newton's method on the closure equations, started from the nominal pose or the pose before, \
-                 which keeps to the assembly mode of the model file.",
+                " are computed by Newton's method on the closure equations, started from the nominal pose or the previous pose. \
+                 This keeps the assembly mode of the model file.",
             ));
             page.paragraph(line);
         }
     }
+    // Determinants of the linear equations of the rates and of the drives' Jacobian.
     let determinants: Vec<PageEquation> = projection
         .determinants
         .iter()
@@ -108,16 +120,17 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
         .collect();
     let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
         .to_owned();
+    // Determinants that are too long are not listed.
     if determinants.is_empty() {
-        says.push_str(" A pose where their matrix is singular is reported as such.");
+        says.push_str(" A pose where their matrix is singular is reported.");
     } else {
-        says.push_str(" The mechanism is singular, and the model says so, where a determinant of theirs or of the drives' Jacobian vanishes:");
+        says.push_str(" The pose is singular, and is reported, where a determinant of these equations or of the drives' Jacobian is zero:");
     }
     page.paragraph([text(says)]);
     page.equations("determinants", determinants);
 }
 
-/// What follows other coordinates.
+/// The section of couplings: coordinates that are given functions of others.
 fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -125,9 +138,11 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
         equations,
         ..
     } = derivation;
+    // Couplings are closures with a coordinate that others determine.
     let closures = equations.projection.loops.closures.iter();
     let mut lines = Vec::new();
     for follower in closures.filter_map(|closure| closure.follower.as_ref()) {
+        // A long coupling is left out.
         let Some(right) = short_formula(graph, mechanism, follower.value) else {
             continue;
         };
@@ -141,14 +156,16 @@ fn list_couplings(page: &mut PageDocument, derivation: &Derivation) {
     if lines.is_empty() {
         return;
     }
+    // Equations of all couplings together.
     page.heading("Couplings");
     page.paragraph([text(
-        "These coordinates follow others, and their rates and accelerations do alike. Forces on them act on what they \
-         follow, times the factor.",
+        "These coordinates are determined by others, and so are their rates and accelerations. A force on one of them acts \
+         on the coordinates that determine it, times the factor.",
     )]);
     page.equations("couplings", lines);
 }
 
+/// The solution in closed form, step by step; a step solves for one or two passive coordinates.
 fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -159,16 +176,20 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     let Some(plan) = closing.plan() else {
         return;
     };
+    // Relations between angles of parallelograms and the like are gathered and shown at the end.
     let mut related = Vec::new();
+    // Whether a coordinate is determined by a coupling.
     let is_follower = |i: &usize| {
         let mut couplings = mechanism.couplings.iter();
         couplings.any(|coupling| coupling.coordinate.0 == *i)
     };
+    // Steps of couplings only are shown in their own section.
     for step in &plan.steps {
         if step.unknown.iter().all(is_follower) {
             continue;
         }
         for relation in &step.solved.relations {
+            // Offsets are multiples of pi/12.
             let offset = Rational::new(i64::from(relation.pi12), 12);
             related.push(PageEquation {
                 left: PrintedFormula::name(&*mechanism.coordinates[relation.coordinate].name),
@@ -183,12 +204,15 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
         if !step.solved.relations.is_empty() {
             continue;
         }
+        // The unknowns of the step, and how they are solved for.
         let mut line = coordinate_names(mechanism, &step.unknown);
+        // How many unknowns of the step are values and not angles states its kind.
         line.push(text(match step.solved.values.len() {
-            0 => " follow in closed form as the intersection of two circles",
-            1 => " follow in closed form as the intersection of a circle and a line",
-            _ => " follow from two linear equations",
+            0 => " are determined in closed form as the intersection of two circles",
+            1 => " are determined in closed form as the intersection of a circle and a line",
+            _ => " are determined by two linear equations",
         }));
+        // The sign of a square root chooses the assembly mode; it is that of the nominal pose.
         if let Some(root) = step.solved.root {
             let sign = if nominal_value(graph, mechanism, root.witness).is_none_or(|x| x >= 0.0) {
                 "positive"
@@ -196,7 +220,7 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
                 "negative"
             };
             line.push(text(format!(
-                "; the nominal pose chooses the {sign} root. Where the radicand is negative the pose is out of reach"
+                "; the nominal pose selects the {sign} root. Where the radicand is negative, the pose cannot be reached"
             )));
         }
         line.push(text("."));
@@ -204,13 +228,14 @@ fn list_closed_form(page: &mut PageDocument, derivation: &Derivation) {
     }
     if !related.is_empty() {
         page.paragraph([text(
-            "Around the nominal pose these passive angles are tied to others outright, which closes their loops identically:",
+            "Around the nominal pose these relations between angles close their loops identically:",
         )]);
         page.equations("relations", related);
     }
 }
 
-/// Drives with their coordinates and Jacobian.
+/// The section of drives: where each acts; for linear drives also length and derivatives by the independent
+/// coordinates.
 pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
         mechanism,
@@ -220,14 +245,19 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     } = derivation;
     let projection = &equations.projection;
     page.heading("Drives");
+    // Whether the paragraph on lengths is needed.
     let mut any_linear = false;
     let rows = mechanism
         .drives
         .iter()
+        // A joint drive acts on a coordinate, a linear drive between two points.
         .map(|drive| {
+            // What the force acts on, and its sign.
             let acts = match drive.kind {
                 DriveKind::Joint(i) => {
+                    // A joint drive acts on its coordinate.
                     let coordinate = &mechanism.coordinates[i.0];
+                    // Torque or force, by the motion of the coordinate.
                     let kind = match coordinate.motion.place_load() {
                         PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
@@ -251,6 +281,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             vec![cell(code(&*drive.name)), acts]
         })
         .collect();
+    // All drives, joint drives as well.
     page.table(
         "drives",
         PageTable {
@@ -258,11 +289,13 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             rows,
         },
     );
+    // Only linear drives are listed: their lengths are new quantities.
     let mut lines = Vec::new();
     for (d, drive) in mechanism.drives.iter().enumerate() {
         if matches!(drive.kind, DriveKind::Joint(_)) {
             continue;
         }
+        // Entries that are zero or too long for a line are left out.
         let mut line = |left: String, id: ExprId| {
             if id == Graph::ZERO {
                 return None;
@@ -277,7 +310,9 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
             });
             Some(())
         };
+        // The length.
         line(format!("l_{}", drive.name), projection.drives[d].coordinate);
+        // The row of the Jacobian.
         for (a, slope) in projection
             .loops
             .active
@@ -290,8 +325,9 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
     }
     if any_linear {
         page.paragraph([text(
-            "Lengths of the linear drives, and their derivatives by the independent coordinates, the Jacobian J; what is not listed is zero. \
-             By virtual power J' f equals the generalised forces of the independent coordinates.",
+            "Lengths of the linear drives and their derivatives with respect to the independent coordinates, the Jacobian J. \
+             Entries not listed are zero, or too long for this list; the programs below show those. \
+             By the principle of virtual power, J' f is the generalised force of the independent coordinates.",
         )]);
         page.blocks.push(PageBlock::Equations(lines));
     }

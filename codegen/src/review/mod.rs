@@ -45,20 +45,22 @@ pub enum PageFormat {
     Latex,
     /// One self-contained HTML file with MathML.
     Html,
-    /// [`Equations`] as JSON; needs the feature `json`.
+    /// [`ReducedEquations`] as JSON; needs the feature `json`.
     #[cfg(any(test, feature = "json"))]
     Json,
 }
 
-/// The page of a model.
+/// The page of a model in one notation.
 ///
-/// `numeric` is the rank of eq. (9) on the file's values, if the caller has found it.
+/// `numeric` is the rank of eq. (9) on the file's values, if the caller has computed it.
 pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&NumericRank>) -> String {
+    // JSON needs no page, so it is composed on demand.
     let document = || compose_page(derivation, numeric);
     match format {
         PageFormat::Text => render_text::render(&document()),
         PageFormat::Markdown => render_markdown::render(&document()),
         PageFormat::Latex => render_latex::render(&document()),
+        // The picture is part of the HTML page only.
         PageFormat::Html => {
             render_html::render(&document(), &mechanism_picture(&derivation.mechanism))
         }
@@ -67,21 +69,24 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
     }
 }
 
-/// The mechanism at its nominal pose.
+/// The mechanism at its nominal pose, as an inline SVG.
 fn mechanism_picture(mechanism: &Mechanism) -> String {
+    // Nominal pose, from the direction in which the mechanism is seen best.
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let scene = MechanismScene::new(mechanism, &nominal);
     inline_svg(&[&scene], &scene.best_view(), &DrawingStyle::default())
 }
 
-/// The derivation, step by step.
+/// The page in the order of the derivation: given quantities, kinematics, effects, base parameters, programs.
 fn compose_page(derivation: &Derivation, numeric: Option<&NumericRank>) -> PageDocument {
     let mechanism = &derivation.mechanism;
+    // The title of the model file, or the name of the model.
     let title = mechanism.title.clone();
     let mut page = PageDocument {
         title: title.unwrap_or_else(|| mechanism.name.clone()),
         blocks: Vec::new(),
     };
+    // Sections in the order in which one follows from the others.
     parameters::summary(&mut page, derivation);
     parameters::quantities(&mut page, mechanism);
     frames::frames(&mut page, mechanism);

@@ -11,12 +11,14 @@ use super::render_text;
 /// Lists of equations beyond this length are shown as text, which a reader can scan and copy.
 const MOST_DISPLAYED: usize = 24;
 
+/// The page as Markdown.
 pub(super) fn render(document: &PageDocument) -> String {
     let mut out = format!("# {}\n\n", escape(&document.title));
     blocks(&mut out, &document.blocks);
     out
 }
 
+/// Blocks in order; folded ones become `details`, which common Markdown viewers show.
 fn blocks(out: &mut String, blocks: &[PageBlock]) {
     for block in blocks {
         match block {
@@ -32,6 +34,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
                 out.push('\n');
             }
             PageBlock::Equations(equations) => write_equations(out, equations),
+            // Markdown allows HTML for this.
             PageBlock::Folded(summary, inner) => {
                 _ = writeln!(out, "<details><summary>{}</summary>\n", html(summary));
                 self::blocks(out, inner);
@@ -41,7 +44,9 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
     }
 }
 
+/// Equations in display style, or as one block of text if they are many.
 fn write_equations(out: &mut String, equations: &[PageEquation]) {
+    // Many formulas are slow to display, and hard to copy.
     if equations.len() > MOST_DISPLAYED {
         _ = writeln!(
             out,
@@ -59,6 +64,7 @@ fn write_equations(out: &mut String, equations: &[PageEquation]) {
     }
 }
 
+/// Spans of a line with Markdown escapes. A bar inside a formula would end a table cell, so it is written as a command.
 fn inlines(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {

@@ -1,5 +1,5 @@
-//! The page and the JSON say what the derivation found: their text read again has the values of the reduction and of
-//! the programs.
+//! Page and JSON agree with the derivation: their text, parsed again, has the values of the reduction and of the
+//! programs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -10,11 +10,11 @@ use super::{
     NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page,
     programs,
 };
-use crate::emit::tree::names::{NamedQuantities, operation_values};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
 use crate::expr::print::{PrintedFormula, atom};
+use crate::names::NamedQuantities;
 use crate::{Derivation, derive};
 
 const MODELS: [&str; 8] = [
@@ -45,7 +45,7 @@ fn derivation(name: &str) -> Derivation {
     derive(&model(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// Values of constants and parameters that are nobody's in particular.
+/// Arbitrary values of constants and parameters.
 fn values(derivation: &Derivation) -> (Vec<f64>, Vec<f64>, BTreeMap<String, f64>) {
     let odd = |i: usize| 0.7 + ((i * 37 + 11) % 29) as f64 / 17.0;
     let mechanism = &derivation.mechanism;
@@ -129,7 +129,7 @@ fn every_product_is_retained_or_depends_on_retained_ones() {
     }
 }
 
-/// The listings, read again and carried out line by line, give what the programs give.
+/// The equations of the listings, evaluated line by line, have the values of the programs.
 #[test]
 fn listed_programs_compute_what_the_programs_compute() {
     for name in MODELS {
@@ -153,7 +153,7 @@ fn listed_programs_compute_what_the_programs_compute() {
                 let before = known.insert(left.text(), value);
                 assert_eq!(before, None, "{name}, {title}: {} twice", left.text());
             }
-            let expected = operation_values(program, &meanings.atoms);
+            let expected = meanings.values(program);
             for (symbol, value) in outputs.iter().zip(&program.outputs) {
                 let found = known[&symbol.text()];
                 assert_close(found, expected[value.index()], &symbol.text());
@@ -162,7 +162,7 @@ fn listed_programs_compute_what_the_programs_compute() {
     }
 }
 
-/// A value that has a meaning carries the value of its meaning.
+/// A named value equals the quantity of its name.
 #[test]
 fn named_values_are_what_they_are_called() {
     let derivation = derivation("spidermill");
@@ -180,7 +180,7 @@ fn named_values_are_what_they_are_called() {
     ] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
-    let values = operation_values(program, &meanings.atoms);
+    let values = meanings.values(program);
     let rate = |i: usize| meanings.atoms[&Atom::Rate(i)];
     let names = meanings.name_values(program);
     let (at, meaning) = names
@@ -230,7 +230,7 @@ fn pages_are_whole_and_the_same_every_time() {
             })
             .collect();
         assert!(markup_is_balanced(&without_scripts), "{name}");
-        // Nothing is fetched.
+        // The page loads no other file.
         assert!(!html.contains("src=") && !html.contains("http") && !html.contains("url("));
         let latex = page(&one, PageFormat::Latex, None);
         assert!(latex_is_balanced(

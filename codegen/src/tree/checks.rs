@@ -1,10 +1,13 @@
-//! What values and expressions of a model file may be.
+//! Checks of the values and expressions of a model file.
 
 use modelmill_spec::{ExactExpression, ExactFunction, Mechanism, ModelSymbol};
 
 use crate::DeriveError;
 
-/// That every value of a mechanism is a finite number.
+/// Checks that every value of a mechanism is a finite number.
+///
+/// # Errors
+/// [`DeriveError::NotFinite`] for the first value that is not.
 pub(crate) fn check_values(mechanism: &Mechanism) -> Result<(), DeriveError> {
     let constants = mechanism.constants.iter().map(|c| (&c.name, c.value));
     let parameters = mechanism.parameters.iter().map(|p| (&p.name, p.nominal));
@@ -15,18 +18,19 @@ pub(crate) fn check_values(mechanism: &Mechanism) -> Result<(), DeriveError> {
         .map_or(Ok(()), |(name, value)| {
             Err(DeriveError::NotFinite {
                 what: format!("the value of `{name}`, {value},"),
-                todo: "give it another one",
+                todo: "set it to a finite number",
             })
         })
 }
 
 /// Whether effects have terms that are not defined, or not finite, at every finite state: quotients, roots and
-/// exponentials of what moves.
+/// exponentials of quantities that move.
 pub(crate) fn may_be_undefined(mechanism: &Mechanism) -> bool {
     let mut terms = mechanism.effects.iter().flat_map(|effect| &effect.terms);
     terms.any(|term| is_partial(&term.expression))
 }
 
+/// Whether an expression may have no finite value at some state.
 fn is_partial(expression: &ExactExpression) -> bool {
     match expression {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
@@ -43,6 +47,7 @@ fn is_partial(expression: &ExactExpression) -> bool {
     }
 }
 
+/// Whether an expression depends on a coordinate or on a quantity of a place.
 fn has_motion(expression: &ExactExpression) -> bool {
     match expression {
         ExactExpression::Rational(_) | ExactExpression::Pi => false,

@@ -1,4 +1,4 @@
-//! Expressions of the model file brought into the graph, and polynomials in the dynamic parameters.
+//! Expressions of the model file as nodes of the graph, and polynomials in the dynamic parameters.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::expr::{Atom, AtomAngleSum, ExprId, Graph, Rational, Unary};
 
 /// A product of powers of dynamic parameters: `m1*dc1^2` is `[(0, 1), (4, 2)]`. Sorted by parameter.
 ///
-/// Monomials are ordered as a dictionary orders the parameters written out one by one, in order of declaration;
+/// Monomials are ordered like words in a dictionary, with the parameters as letters in the order of their declaration;
 /// this is the order of eq. (5).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ParameterMonomial(pub Vec<(usize, u32)>);
@@ -22,6 +22,7 @@ impl ParameterMonomial {
     /// The product of two monomials.
     #[must_use]
     pub fn times(&self, other: &Self) -> Self {
+        // Exponents of equal parameters add up.
         let mut powers: BTreeMap<usize, u32> = self.0.iter().copied().collect();
         for (parameter, n) in &other.0 {
             *powers.entry(*parameter).or_insert(0) += n;
@@ -29,6 +30,7 @@ impl ParameterMonomial {
         Self(powers.into_iter().collect())
     }
 
+    /// The parameters, each as often as its power states.
     fn repeated_parameters(&self) -> impl Iterator<Item = usize> {
         self.0
             .iter()
@@ -55,7 +57,7 @@ impl ParameterMonomial {
         factors.join("*")
     }
 
-    /// Its value for given parameters.
+    /// Its value for given parameters, by index.
     pub fn value(&self, parameters: &[f64]) -> f64 {
         self.0
             .iter()
@@ -76,7 +78,7 @@ impl Ord for ParameterMonomial {
     }
 }
 
-/// A power of a sum of parameters can have more terms than anybody wants to see.
+/// Largest number of terms of a polynomial, since powers of sums of parameters can have very many.
 const MOST_TERMS: usize = 2000;
 
 /// A polynomial in the dynamic parameters whose coefficients are expressions over constants.
@@ -84,6 +86,7 @@ const MOST_TERMS: usize = 2000;
 pub(crate) struct ParameterPolynomial(pub(crate) BTreeMap<ParameterMonomial, ExprId>);
 
 impl ParameterPolynomial {
+    /// A polynomial without parameters.
     fn constant(value: ExprId) -> Self {
         let mut terms = BTreeMap::new();
         if value != Graph::ZERO {
@@ -92,6 +95,7 @@ impl ParameterPolynomial {
         Self(terms)
     }
 
+    /// The sum; terms that cancel are removed.
     pub(crate) fn plus(&self, other: &Self, graph: &mut Graph) -> Self {
         let mut terms = self.0.clone();
         for (monomial, value) in &other.0 {
@@ -102,6 +106,7 @@ impl ParameterPolynomial {
         Self(terms)
     }
 
+    /// The product with a number.
     pub(crate) fn scale(&self, factor: &Rational, graph: &mut Graph) -> Self {
         Self(
             self.0
@@ -111,7 +116,10 @@ impl ParameterPolynomial {
         )
     }
 
-    /// The product; an error where it would have thousands of terms.
+    /// The product of two polynomials.
+    ///
+    /// # Errors
+    /// [`DeriveError::TooManyTerms`] if it has more than [`MOST_TERMS`] terms.
     pub(crate) fn times(&self, other: &Self, graph: &mut Graph) -> Result<Self, DeriveError> {
         let mut terms: BTreeMap<ParameterMonomial, Vec<(ExprId, Rational)>> = BTreeMap::new();
         for (m, a) in &self.0 {
@@ -126,6 +134,7 @@ impl ParameterPolynomial {
                 }
             }
         }
+        // Coefficients of equal monomials are added, and those that cancel are dropped.
         let mut product: BTreeMap<ParameterMonomial, ExprId> = terms
             .into_iter()
             .map(|(m, values)| (m, graph.sum(&values)))
@@ -135,7 +144,7 @@ impl ParameterPolynomial {
     }
 }
 
-/// A multiple of pi/12 and a sum of atoms.
+/// An exact angle as a sum of atoms and a multiple of pi/12.
 pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
     let twelfths = Rational::from(angle.pi.clone());
     let twelfths = &twelfths * &Rational::integer(12);
@@ -144,6 +153,7 @@ pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
         "a validated angle's fixed part is a multiple of pi/12, not pi * {}",
         angle.pi
     );
+    // Full turns are dropped.
     let pi12 = twelfths.to_big().to_integer() % num_bigint::BigInt::from(24);
     let terms = angle.terms.iter().map(|(symbol, n)| (atom(*symbol), *n));
     (
@@ -152,6 +162,7 @@ pub(crate) fn angle_sum(angle: &ExactAngle) -> (AtomAngleSum, i32) {
     )
 }
 
+/// The atom of a symbol of the model file; quantities of a place must have been replaced before.
 fn atom(symbol: ModelSymbol) -> Atom {
     match symbol {
         ModelSymbol::Constant(i) => Atom::Constant(i.0),
@@ -161,7 +172,7 @@ fn atom(symbol: ModelSymbol) -> Atom {
     }
 }
 
-/// The offset and the coordinates of a length as one expression.
+/// The offset and the coordinates of a length as one expression, m.
 pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, DeriveError> {
     let mut terms = vec![(expression(graph, &length.offset)?, Rational::ONE)];
     for (coordinate, factor) in &length.coordinates {
@@ -173,7 +184,10 @@ pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, 
     Ok(graph.sum(&terms))
 }
 
-/// An expression without dynamic parameters or quantities of a place.
+/// An expression without dynamic parameters and without quantities of a place.
+///
+/// # Errors
+/// [`DeriveError`] if it has any of these, or divides by zero.
 pub(crate) fn expression(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -181,13 +195,15 @@ pub(crate) fn expression(
     expression_at(graph, exact, &|_| None)
 }
 
-/// An expression over constants and the quantities of a place.
+/// An expression over constants and the quantities of a place, which `place` returns.
 pub(crate) fn expression_at(
     graph: &mut Graph,
     exact: &ExactExpression,
     place: &dyn Fn(PlaceQuantity) -> Option<ExprId>,
 ) -> Result<ExprId, DeriveError> {
+    // A polynomial without parameters has at most one term.
     let polynomial = polynomial_at(graph, exact, place)?;
+    // Only the monomial without parameters is allowed.
     match polynomial.0.len() {
         0 => Ok(Graph::ZERO),
         1 if polynomial.0.contains_key(&ParameterMonomial::default()) => {
@@ -200,7 +216,7 @@ pub(crate) fn expression_at(
     }
 }
 
-/// An expression as a polynomial in the dynamic parameters.
+/// An expression without quantities of a place, as a polynomial in the dynamic parameters.
 pub(crate) fn polynomial(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -208,6 +224,7 @@ pub(crate) fn polynomial(
     polynomial_at(graph, exact, &|_| None)
 }
 
+/// An expression as a polynomial in the dynamic parameters, with the quantities of a place from `place`.
 fn polynomial_at(
     graph: &mut Graph,
     exact: &ExactExpression,
@@ -221,6 +238,7 @@ fn polynomial_at(
         ExactExpression::Symbol(ModelSymbol::Parameter(i)) => ParameterPolynomial(BTreeMap::from(
             [(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)],
         )),
+        // Quantities of places exist only inside effects.
         ExactExpression::Symbol(ModelSymbol::Place(quantity)) => match place(*quantity) {
             Some(value) => ParameterPolynomial::constant(value),
             None => {
@@ -247,6 +265,7 @@ fn polynomial_at(
             }
             total
         }
+        // Parameters in a denominator are not supported.
         ExactExpression::Quotient(a, b) => {
             let divisor = expression_at(graph, b, place)?;
             if divisor == Graph::ZERO {
@@ -265,6 +284,7 @@ fn polynomial_at(
             }
             ParameterPolynomial::constant(graph.pow(base, *n))
         }
+        // Repeated multiplication: exponents in files are small.
         ExactExpression::Power(a, n) => {
             let base = polynomial_at(graph, a, place)?;
             let mut power = ParameterPolynomial::constant(Graph::ONE);
@@ -273,7 +293,9 @@ fn polynomial_at(
             }
             power
         }
+        // Sines and cosines of exact angles stay exact; other arguments become nodes of their own.
         ExactExpression::Apply(function, a) => {
+            // An exact angle, if the argument is one.
             if let (ExactFunction::Sin | ExactFunction::Cos, Some((sum, pi12))) =
                 (function, AngleAccumulator::angle(a))
             {
@@ -292,12 +314,13 @@ fn polynomial_at(
     })
 }
 
-/// The expression with a place's coordinate, or that of the other place, named.
+/// The expression with a quantity of a place replaced by a coordinate of the mechanism.
 pub(crate) fn name_place_coordinate(
     exact: &ExactExpression,
     quantity: PlaceQuantity,
     coordinate: CoordinateIdx,
 ) -> ExactExpression {
+    // Replaces the quantity in an operand.
     let inner = |a: &ExactExpression| Box::new(name_place_coordinate(a, quantity, coordinate));
     let all = |operands: &[ExactExpression]| {
         operands
@@ -321,6 +344,7 @@ pub(crate) fn name_place_coordinate(
     }
 }
 
+/// The graph's function for one of the model file.
 fn unary(function: ExactFunction) -> Unary {
     match function {
         ExactFunction::Sin => Unary::Sin,
@@ -333,17 +357,19 @@ fn unary(function: ExactFunction) -> Unary {
     }
 }
 
-/// An angle in the making: multiples of pi and of atoms.
+/// Terms of an angle that is being collected: multiples of pi and of atoms.
 #[derive(Default)]
 struct AngleAccumulator {
+    /// Factor of pi.
     pi: Rational,
+    /// Atoms with rational factors, in order of occurrence.
     atoms: Vec<(Atom, Rational)>,
 }
 
 impl AngleAccumulator {
     /// An expression as an exact angle; `None` if it is no sum of integer multiples of angles and of pi/12.
     fn angle(exact: &ExactExpression) -> Option<(AtomAngleSum, i32)> {
-        /// Sines of larger multiples are no polynomials that anyone wants to see.
+        /// Largest integer factor: sines of larger multiples have too many terms as polynomials.
         const MOST: u32 = 100;
         let mut parts = Self::default();
         parts.collect_terms(exact, &Rational::ONE)?;
@@ -362,6 +388,7 @@ impl AngleAccumulator {
         Some((AtomAngleSum::new(atoms?), pi12))
     }
 
+    /// Adds `factor` times an expression to the terms; `None` if that is not linear in angles and pi.
     fn collect_terms(&mut self, exact: &ExactExpression, factor: &Rational) -> Option<()> {
         match exact {
             ExactExpression::Rational(value) if Rational::from(value.clone()).is_zero() => {}
@@ -383,13 +410,14 @@ impl AngleAccumulator {
                 }
                 _ => return None,
             },
+            // At most one operand may be other than a number.
             ExactExpression::Product(operands) => {
                 let mut factor = factor.clone();
                 let mut rest = None;
                 for operand in operands {
                     match operand {
                         ExactExpression::Rational(value) => {
-                            factor = &factor * &Rational::from(value.clone())
+                            factor = &factor * &Rational::from(value.clone());
                         }
                         _ if rest.is_none() => rest = Some(operand),
                         _ => return None,

@@ -1,9 +1,9 @@
-//! A controller that watches its own model: the dry friction of one spindle grows, an alarm is raised, and the parameter
-//! is named.
+//! A controller that monitors its own model: the dry friction of one spindle grows, an alarm is raised, and the changed
+//! parameter is identified.
 //!
-//! The machine is the rig: all bodies of the parallel robot SpiderMill with rods and friction, read at 1 kHz by encoders
-//! of 20 bits and sensors of the forces whose noise is partly coloured; it shares no mechanics with the emitted code. The
-//! watch starts from the parameters that a controller uses, which are not the true ones.
+//! The machine is the rig: all bodies of the parallel robot SpiderMill with rods and friction. Encoders of 20 bits and
+//! force sensors with partly coloured noise are read at 1 kHz. The rig shares no mechanics with the emitted code. The
+//! watch starts from the parameters of a controller, which are not the true ones.
 //!
 //! `cargo run --release -p modelmill-example-live`, or with `-- 10` for ten hours in which nothing happens.
 
@@ -25,9 +25,10 @@ use modelmill_runtime::live::{Options, WatchChange, WatchVerdict};
 use smoothing::{MotionSmoother, SmoothedState};
 use spidermill_worn as model;
 
-/// Rate of a spindle below which its friction may be anything, m/s.
+/// Below this rate of a spindle, m/s, its friction is unknown.
 const STANDSTILL: f64 = 5e-3;
 
+/// Runs the machine with wear; or, with a number of hours as the argument, without any change.
 fn main() -> Result<(), Box<dyn Error>> {
     if let Some(hours) = std::env::args().nth(1) {
         let mut sitting = WatchSession::new(SimulatedMachine::new(1)?)?;
@@ -51,24 +52,29 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A machine with a watch over it, and what the watch has said.
+/// A machine with its watch, and the results of the watch.
 #[derive(Clone, Debug)]
 struct WatchSession {
+    /// The simulated machine.
     machine: SimulatedMachine,
+    /// Differentiates its readings.
     smoother: MotionSmoother,
+    /// Computes drive rates and regressors; emitted.
     model: model::Model<f64>,
+    /// Compares forces and model; emitted.
     watch: model::Watch<f64>,
-    /// When the watch had learned, s.
+    /// End of the watch's learning, s.
     learned: Option<f64>,
     /// Times of alarms, s.
     alarms: Vec<f64>,
-    /// Changes whose parameter was told, with the time of that, s.
+    /// Changes whose parameter was identified, with the time of that, s.
     identified: Vec<(f64, WatchChange<f64, { model::N_BASE }>)>,
-    /// Time that steps took, s; of the first hundred thousand.
+    /// Times that steps of the watch took, s; of the first hundred thousand.
     steps: Vec<f64>,
 }
 
 impl WatchSession {
+    /// Starts the watch with the parameters of the controller.
     fn new(machine: SimulatedMachine) -> Result<Self, Box<dyn Error>> {
         let geometry = model::Geometry::default();
         let options = Options::at_rate(1.0 / CYCLE);
@@ -84,17 +90,19 @@ impl WatchSession {
         })
     }
 
-    /// Lets the machine move until a time, s. A change is accepted ten seconds after its alarm.
+    /// Runs the machine until a time, s. A change is accepted ten seconds after its alarm.
     fn run_until(&mut self, end: f64) -> Result<(), Box<dyn Error>> {
         const PATIENCE: f64 = 10.0;
         let mut is_raised = false;
         while self.machine.time() < end {
             let t = self.machine.time();
             let reading = self.machine.read();
+            // The smoother has a delay: its first state comes after half a window.
             let Some(motion) = self.smoother.add_readings(reading.q, reading.forces) else {
                 continue;
             };
             let (state, forces) = sample(&self.model, &motion)?;
+            // Only the watch is timed, with the regressor that it computes.
             let start = Instant::now();
             let verdict = *self.watch.step(&state, &forces)?;
             if self.steps.len() < 100_000 {
@@ -103,6 +111,7 @@ impl WatchSession {
             match verdict {
                 WatchVerdict::Learning => {}
                 WatchVerdict::Quiet => self.learned = self.learned.or(Some(t)),
+                // The first sample of a change is an alarm. Later ones identify the parameter.
                 WatchVerdict::Changed(change) => {
                     if !is_raised {
                         self.alarms.push(t);
@@ -125,12 +134,12 @@ impl WatchSession {
         Ok(())
     }
 
-    /// What was said, as it is printed.
+    /// The results as lines of text.
     fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         if let Some(t) = self.learned {
             lines.push(format!(
-                "{t:7.2} s  the watch has learned how this machine moves"
+                "{t:7.2} s  the watch has learned the usual motion of this machine"
             ));
         }
         let mut told = self.identified.iter();
@@ -141,7 +150,7 @@ impl WatchSession {
             };
             let parameter = &model::BASE_PARAMETERS[change.parameter];
             lines.push(format!(
-                "{t:7.2} s  it is {}, by {:+.1} +- {:.1} {}; this alone explains {:.0} % of what changed",
+                "{t:7.2} s  {} changed by {:+.1} +- {:.1} {}; this parameter alone explains {:.0} % of the change",
                 parameter.expression,
                 change.amount,
                 change.deviation,
@@ -152,20 +161,20 @@ impl WatchSession {
         lines
     }
 
-    /// What a step costs, regressor included.
+    /// Mean time of a step of the watch, and the time that 99.9 % of the steps do not exceed.
     fn times(&self) -> String {
         let mut sorted = self.steps.clone();
         sorted.sort_by(f64::total_cmp);
         let mean = 1e6 * sorted.iter().sum::<f64>() / sorted.len() as f64;
         let most = 1e6 * sorted[sorted.len() * 999 / 1000];
         format!(
-            "a step of 1000 us takes {mean:.2} us in the mean, regressor included, and 999 of 1000 take less than \
-             {most:.2} us"
+            "a step of the watch with its regressor takes {mean:.2} us on average, and 999 of 1000 steps take less \
+             than {most:.2} us; the cycle is 1000 us"
         )
     }
 }
 
-/// A state and its forces for the watch; drives that hardly move are left out.
+/// A state and its forces for the watch; NaN stands for the force of a drive that hardly moves.
 fn sample(
     model: &model::Model<f64>,
     motion: &SmoothedState,
@@ -188,7 +197,7 @@ fn sample(
 mod tests {
     use super::*;
 
-    /// Each friction of each spindle, from the same state of the watch.
+    /// Every friction parameter of every spindle, from the same state of the watch.
     #[test]
     fn friction_that_grows_is_named_within_ten_seconds() {
         let mut sitting = WatchSession::new(SimulatedMachine::new(1).unwrap()).unwrap();

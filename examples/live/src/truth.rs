@@ -1,4 +1,4 @@
-//! Where the truth is known to the last digit: forces are `H_min p_min` of the emitted model, and noise.
+//! Tests with exactly known parameters: forces are `H_min p_min` of the emitted model, plus noise.
 
 use std::f64::consts::TAU;
 
@@ -9,10 +9,12 @@ use crate::machine::{CYCLE, parameters_in_use, times};
 use crate::motion::motion;
 use crate::spidermill_worn as model;
 
+/// Number of base parameters.
 const NB: usize = model::N_BASE;
+/// Regressor rows of both drives at one time.
 type SampleRows = [[f64; NB]; 2];
 
-/// Rows of the regressor over a period; the right crank may rest.
+/// Rows of the regressor over a period; the right crank may be at standstill.
 fn rows(right_rests: bool) -> Vec<SampleRows> {
     let emitted = model::Model::<f64>::default();
     let states = times().map(|t| {
@@ -27,21 +29,27 @@ fn rows(right_rests: bool) -> Vec<SampleRows> {
         .collect()
 }
 
-/// Forces with noise of 8 N, white or below 1 Hz or half of each, under a watch.
+/// A watch of simulated forces with noise of 8 N: white, below 1 Hz, or a mixture.
 #[derive(Clone)]
 struct WatchBench {
+    /// The watch under test.
     watch: ParameterWatch<f64, NB, 2>,
+    /// True base parameters.
     parameters: [f64; NB],
+    /// Source of the noise.
     random: Random,
     /// Share of the noise that is coloured.
     colour: f64,
+    /// Present value of the coloured noise of each drive.
     wandering: [f64; 2],
     /// Drives whose forces are not measured.
     silent: [bool; 2],
+    /// Number of samples so far.
     n: usize,
 }
 
 impl WatchBench {
+    /// True parameters are 10 % larger than those of the controller.
     fn new(colour: f64, seed: u64) -> Self {
         let in_use = parameters_in_use().unwrap();
         Self {
@@ -55,13 +63,15 @@ impl WatchBench {
         }
     }
 
+    /// A random number with mean zero and standard deviation one.
     fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.random.uniform(f64::MIN_POSITIVE, 1.0).ln()).sqrt();
         radius * (TAU * self.random.uniform(0.0, 1.0)).cos()
     }
 
-    /// Goes on for some seconds; the time of each sample at which a change stands, with the parameter that is told.
+    /// Continues for some seconds. Returns one entry per sample with a change: the parameter, if it is identified.
     fn run_seconds(&mut self, rows: &[SampleRows], seconds: u32) -> Vec<Option<usize>> {
+        // Correlation of coloured noise from sample to sample, for 1 Hz.
         let stays = f64::exp(-TAU * 1.0 * CYCLE);
         let mut changes = Vec::new();
         for _ in 0..1000 * seconds {
@@ -86,7 +96,7 @@ impl WatchBench {
         changes
     }
 
-    /// Changes a parameter so that some force changes by `size` N, root mean square.
+    /// Changes a parameter so that the force of one drive changes by `size` N, root mean square.
     fn change(&mut self, parameter: usize, size: f64, rows: &[SampleRows]) {
         let rms = |d: usize| {
             let squares: f64 = rows.iter().map(|r| r[d][parameter].powi(2)).sum();
@@ -111,7 +121,7 @@ fn each_parameter_is_named_within_ten_seconds_and_no_other() {
             assert_eq!(last, Some(parameter), "of colour {colour}");
             let told = found.iter().flatten();
             assert!(told.into_iter().all(|p| *p == parameter));
-            // What the window has by now is the new value.
+            // The window already has the new value.
             let estimate = changed.watch.estimate()[parameter];
             let step = changed.parameters[parameter] - bench.parameters[parameter];
             let missing = (estimate - changed.parameters[parameter]) / step;
@@ -144,7 +154,7 @@ fn what_rests_is_not_named_and_raises_nothing_as_it_begins_to_move() {
     };
     let mut bench = WatchBench::new(0.3, 2);
     assert!(bench.run_seconds(&resting, 120).is_empty());
-    // Friction that is not felt.
+    // Friction of the spindle at standstill has no effect.
     let mut unfelt = bench.clone();
     for p in (0..NB).filter(|p| of_right(*p) && *p > 5) {
         unfelt.parameters[p] *= 3.0;
@@ -155,7 +165,7 @@ fn what_rests_is_not_named_and_raises_nothing_as_it_begins_to_move() {
     changed.parameters[6] += 20.0;
     let found = changed.run_seconds(&resting, 10);
     assert_eq!(found.last(), Some(&Some(6)));
-    // Nothing has changed but the motion.
+    // Only the motion has changed.
     assert!(bench.run_seconds(&moving, 120).is_empty());
 }
 
@@ -186,7 +196,7 @@ fn what_is_no_number_is_left_out_and_counted() {
     assert_eq!(bench.watch.n_skipped_blocks(), 2);
     assert_eq!(*bench.watch.verdict(), WatchVerdict::Quiet);
     assert!(bench.watch.estimate().iter().all(|p| p.is_finite()));
-    // Nothing at all is measured, for longer than any memory.
+    // No force is measured, for longer than the memory of the watch.
     for _ in 0..2_000_000 {
         bench.watch.step(&rows[0], &[f64::NAN; 2]);
     }

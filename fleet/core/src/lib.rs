@@ -2,16 +2,14 @@
 //! the parameters of a robot, a day or a part are solved from the sum of its summaries.
 //!
 //! 1. [`FleetPlan`]: how every recording is prepared and what its columns mean, made once from a few reference
-//! recordings. It is one
-//!    JSON document; with the same plan, every computer makes the same summaries.
+//!    recordings. It is one JSON document; with the same plan, every computer makes the same summaries.
 //! 2. [`FleetModel::summarise`]: one recording, its rows in any order, to a [`FleetSummary`]: R factor of the base
-//! columns, products
-//!    of all columns, counts, and faults. A recording that cannot be evaluated gives a summary with the reason.
+//!    columns, products of all columns, counts, and faults. A recording that cannot be evaluated gives a summary with
+//!    the reason.
 //! 3. [`FleetSummary::merge`]: adds summaries; associative and commutative up to rounding.
 //! 4. [`FleetModel::solve`]: base parameters with standard deviations.
 //! 5. [`robot`]: the days of one robot, with permanent changes and dead sensors. [`outliers`]: which robots differ from
-//! the others,
-//!    and in what. Neither reads a recording again.
+//!    the others, and in what. Neither reads a recording again.
 //!
 //! This needs no query engine; crates for engines on several computers are next to this one.
 

@@ -1,5 +1,5 @@
-//! Rows of a regressor, channel by channel: of a channel only the columns that act on it are kept, as the joints of a leg know
-//! nothing of the other, and friction acts on one drive.
+//! A regressor stored by channel: for each channel only the columns that are not zero. This saves most of the work, as
+//! the joints of one leg do not depend on those of another, and friction acts on one drive.
 
 use std::ops::Range;
 
@@ -8,22 +8,27 @@ use nalgebra::{DMatrix, DVector};
 /// A regressor whose rows are those of some channels at some samples.
 #[derive(Debug, Clone)]
 pub struct ChannelRegressor {
+    /// Number of all columns.
     columns: usize,
+    /// Rows of each channel.
     channels: Vec<ChannelRows>,
 }
 
-/// Rows of a channel, `[sample, own column]`, and which columns these are.
+/// Rows of one channel with its own columns.
 #[derive(Debug, Clone)]
 struct ChannelRows {
+    /// Indices of its columns among all columns.
     column_indices: Vec<usize>,
+    /// Values, `[sample, own column]`.
     rows: DMatrix<f64>,
 }
 
 impl ChannelRegressor {
-    /// From rows interleaved per sample, `row = sample * channels + channel`.
+    /// Splits a regressor whose rows are interleaved per sample, `row = sample * channels + channel`.
     pub fn new(regressor: &DMatrix<f64>, channels: usize) -> Self {
         let samples = regressor.nrows() / channels.max(1);
         let one = |c: usize| {
+            // A column belongs to a channel if it is not zero in all of its rows.
             let acts = |k: &usize| (0..samples).any(|i| regressor[(i * channels + c, *k)] != 0.0);
             let which: Vec<usize> = (0..regressor.ncols()).filter(acts).collect();
             let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
@@ -55,9 +60,10 @@ impl ChannelRegressor {
         self.channels.first().map_or(0, |c| c.rows.nrows())
     }
 
-    /// One sample of so many each.
+    /// Keeps every `step`-th sample.
     #[must_use]
     pub fn subsample(&self, step: usize) -> Self {
+        // The columns of a channel stay the same, even if one becomes zero.
         let kept: Vec<usize> = (0..self.samples()).step_by(step).collect();
         let channels = self.channels.iter().map(|channel| ChannelRows {
             column_indices: channel.column_indices.clone(),
@@ -69,7 +75,8 @@ impl ChannelRegressor {
         }
     }
 
-    /// With further columns behind the others, each of which takes what is given of the channels that `takes` says.
+    /// Appends `further` columns. Channel `c` gets the values of `of` (interleaved per sample) in the new column
+    /// `takes(c)`.
     pub(super) fn append_columns(
         &self,
         further: usize,
@@ -78,6 +85,7 @@ impl ChannelRegressor {
     ) -> Self {
         let n = self.channels.len();
         let channels = self.channels.iter().enumerate().map(|(c, channel)| {
+            // The new column is the last one of each channel.
             let own = channel.column_indices.len();
             let mut which = channel.column_indices.clone();
             which.push(self.columns + takes(c));
@@ -96,11 +104,12 @@ impl ChannelRegressor {
         }
     }
 
-    /// What values of the columns give, interleaved per sample.
+    /// Product of the regressor with parameter values, interleaved per sample.
     pub fn multiply(&self, values: &[f64]) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.samples() * n);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Values of the columns of this channel.
             let own = DVector::from_iterator(
                 channel.column_indices.len(),
                 channel.column_indices.iter().map(|k| values[*k]),
@@ -112,11 +121,12 @@ impl ChannelRegressor {
         result
     }
 
-    /// Inner products of all columns with what is given, interleaved per sample.
+    /// Inner products of all columns with a vector that is interleaved per sample.
     pub(super) fn multiply_transposed(&self, of: &DVector<f64>) -> DVector<f64> {
         let n = self.channels.len();
         let mut result = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Entries of this channel.
             let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
             for (k, column) in channel
                 .column_indices
@@ -129,7 +139,8 @@ impl ChannelRegressor {
         result
     }
 
-    /// Normal equations of some samples with weighted rows: their matrix and right side.
+    /// Normal equations of a range of samples: matrix and right side. `weights` and `measured` are interleaved per
+    /// sample.
     pub(super) fn normal_equations(
         &self,
         weights: &DVector<f64>,
@@ -140,11 +151,14 @@ impl ChannelRegressor {
         let mut normal = DMatrix::zeros(self.columns, self.columns);
         let mut right = DVector::zeros(self.columns);
         for (c, channel) in self.channels.iter().enumerate() {
+            // Interleaved index of a sample of the range.
             let at = |i: usize| (samples.start + i) * n + c;
+            // Transposed rows times their weights.
             let mut weighted = channel.rows.rows_range(samples.clone()).transpose();
             for (i, mut column) in weighted.column_iter_mut().enumerate() {
                 column *= weights[at(i)];
             }
+            // Products among the columns of this channel, then added to their places in the complete matrix.
             let own = &weighted * channel.rows.rows_range(samples.clone());
             let forces = DVector::from_fn(samples.len(), |i, _| measured[at(i)]);
             let own_right = &weighted * forces;
@@ -158,8 +172,8 @@ impl ChannelRegressor {
         (normal, right)
     }
 
-    /// Rows of some channels that count, below each other, times a weight of each channel; with their places,
-    /// `sample * channels + channel`. Only columns that act on these channels.
+    /// Used rows of some channels as one dense matrix, each multiplied by the weight of its channel; with their
+    /// indices, `sample * channels + channel`. It has only the columns of these channels.
     pub(super) fn dense_rows(
         &self,
         of: &[usize],
@@ -169,12 +183,14 @@ impl ChannelRegressor {
         let n = self.channels.len();
         let mut place = vec![None; self.columns];
         let mut width = 0;
+        // Number the columns of these channels in the order in which they first appear.
         for k in of.iter().flat_map(|c| &self.channels[*c].column_indices) {
             place[*k].get_or_insert_with(|| {
                 width += 1;
                 width - 1
             });
         }
+        // Used rows, channel by channel.
         let rows: Vec<usize> = (of.iter())
             .flat_map(|c| (0..self.samples()).map(move |i| i * n + c))
             .filter(|row| counts[*row])
@@ -184,6 +200,7 @@ impl ChannelRegressor {
             let channel = &self.channels[row % n];
             let weight = weights[row % n];
             for (j, k) in channel.column_indices.iter().enumerate() {
+                // Each value goes to the column with the new number.
                 if let Some(at) = place[*k] {
                     matrix[(to, at)] = weight * channel.rows[(row / n, j)];
                 }
@@ -198,7 +215,7 @@ mod tests {
     use super::*;
     use crate::test_noise::TestNoise;
 
-    /// Products channel by channel are those of the whole matrix.
+    /// Products channel by channel equal those of the complete matrix.
     #[test]
     fn products_are_those_of_the_whole_matrix() {
         let mut noise = TestNoise::new(5);

@@ -1,29 +1,32 @@
-//! Forces that are exchanged or turned round: a regressor and the measured forces go in; what swapping or turning round forces
-//! would gain comes out.
+//! Exchanged or reversed force columns. Input: a regressor and measured forces. Output: the exchange or change of sign
+//! that lowers the error of the best fit most.
 //!
-//! What the best fit to any forces `y` leaves is `|y|^2 - y'W (W'W)^-1 W'y`, so that one factorisation of the normal equations
-//! serves every permutation of the forces.
+//! The squared residual of the best fit to any forces `y` is `|y|^2 - y'W (W'W)^-1 W'y`, so that one factorisation of
+//! the normal equations serves every permutation of the forces.
 
 use nalgebra::{Cholesky, DVector, Dyn};
 
 use super::by_channel::ChannelRegressor;
 use super::robust::factor_normal;
+use super::thresholds::WIRING_ROWS_PER_COLUMN;
 
-/// How well a regressor can explain forces.
+/// A factorised regressor, which gives the error of the best fit to any forces.
 #[derive(Debug, Clone)]
 pub struct ForceAudit {
+    /// The regressor.
     regressor: ChannelRegressor,
-    /// Of the normal equations of scaled columns, with the scales.
+    /// Factor of the normal equations of scaled columns.
     factor: Cholesky<f64, Dyn>,
+    /// Scales of the columns.
     scale: DVector<f64>,
 }
 
-/// Something about the forces that would explain them better.
+/// A fault of the force columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WiringFault {
-    /// Two channels are exchanged.
+    /// Two channels are exchanged; their indices.
     Swapped(usize, usize),
-    /// A channel has another sign than the others; of two channels it is not known which.
+    /// A channel has the opposite sign of the others; its index. With two channels it is not known which of them.
     Reversed(usize),
 }
 
@@ -31,9 +34,10 @@ impl ForceAudit {
     /// Factorises a regressor; `None` if it has fewer rows than twice its columns, or a number that is not finite.
     pub fn new(regressor: ChannelRegressor) -> Option<Self> {
         let rows = regressor.samples() * regressor.channels();
-        if rows == 0 || rows < 2 * regressor.columns() {
+        if rows == 0 || rows < WIRING_ROWS_PER_COLUMN * regressor.columns() {
             return None;
         }
+        // All rows have equal weight; the forces are not needed for the factor.
         let alike = DVector::from_element(rows, 1.0);
         let none = DVector::zeros(rows);
         let (normal, _) = regressor.normal_equations(&alike, &none, 0..regressor.samples());
@@ -57,6 +61,7 @@ impl ForceAudit {
     pub fn find_wiring_fault(&self, forces: &DVector<f64>) -> Option<(WiringFault, [f64; 2])> {
         let n = self.regressor.channels();
         let now = self.error(forces)?;
+        // Apply a change to a copy of the forces.
         let changed = |change: WiringFault| {
             let mut changed = forces.clone();
             for row in 0..forces.len() / n {
@@ -67,6 +72,7 @@ impl ForceAudit {
             }
             changed
         };
+        // Try all exchanges of two channels and all changes of one sign, and take the best.
         let swaps = (0..n).flat_map(|a| (a + 1..n).map(move |b| WiringFault::Swapped(a, b)));
         swaps
             .chain((0..n).map(WiringFault::Reversed))
@@ -129,7 +135,7 @@ mod tests {
         assert_eq!(found, WiringFault::Swapped(0, 1));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");
         let turned = interleaved([&forces[0], &forces[1]], -1.0);
-        // With two channels the one cannot be told from the other: all parameters may change their signs.
+        // With two channels it is not known which is reversed: all parameters may change their signs.
         let (found, [before, after]) = explained.find_wiring_fault(&turned).unwrap();
         assert!(matches!(found, WiringFault::Reversed(_)));
         assert!(before > 0.2 && after < 0.02, "{before} {after}");

@@ -1,35 +1,36 @@
-//! A fit that outliers, contacts and friction near reversals do not pull to themselves: rows of a regressor go in, values and
-//! what they leave of each row come out.
+//! Robust least squares, which is not biased by outliers, contacts and friction near reversals. Input: a regressor and
+//! measured values; output: estimates and residuals.
 //!
-//! Huber's function by reweighted rows (Ann. Math. Statist. 35, 1964), each channel by its own scale: 1.4826 times the median of
-//! what is left. Columns may depend on each other, since a trace of a ridge stands on the scaled normal equations.
+//! Huber's function by reweighted rows (Ann. Math. Statist. 35, 1964), with a scale for each channel: 1.4826 times the
+//! median of the absolute residuals. Columns may be dependent, since a very small ridge is added to the scaled normal
+//! equations.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::by_channel::ChannelRegressor;
+use super::thresholds::AUDIT_HUBER_BOUND_SIGMAS;
 use crate::signal::median;
 
-/// Huber's bound in standard deviations, and how often rows are reweighted.
-const BOUND: f64 = 1.345;
+/// Number of times rows are reweighted.
 const ROUNDS: usize = 5;
-/// What is left below this part of the largest force is rounding.
+/// Residuals below this share of the largest force are rounding.
 const ROUNDING: f64 = 1e-9;
-/// The ridge on scaled normal equations.
+/// Ridge that is added to the diagonal of the scaled normal equations, which is 1.
 const RIDGE: f64 = 1e-10;
 
-/// Values that fit rows, and what they leave.
+/// Result of a robust fit.
 #[derive(Debug, Clone)]
 pub struct RobustFit {
-    /// One for each column.
+    /// Estimates, one per column.
     pub values: DVector<f64>,
-    /// Measured less fitted, for each row.
+    /// Measured minus fitted values, one per row.
     pub residual: DVector<f64>,
-    /// Squares of what rows were multiplied by.
+    /// Weights of the squared residuals, one per row.
     pub weights: DVector<f64>,
 }
 
-/// Fits measured values interleaved per sample, `row = sample * channels + channel`, of which those count that `counts` says so.
-/// `None` where a number is not finite or nothing counts.
+/// Fits measured values that are interleaved per sample, `row = sample * channels + channel`; only rows for which
+/// `counts` is true are used. `None` if a number is not finite or no row is used.
 pub fn robust_fit(
     regressor: &ChannelRegressor,
     measured: &DVector<f64>,
@@ -43,12 +44,13 @@ pub fn robust_fit(
         for channel in 0..channels {
             let rows = || (channel..rest.len()).step_by(channels);
             let counted = || rows().filter(|i| counts[*i]);
+            // The scale is limited by rounding relative to the largest force.
             let largest = counted().fold(0.0_f64, |most, i| most.max(measured[i].abs()));
-            // A channel of zeros says nothing.
+            // A channel of zeros contains no information.
             if largest == 0.0 {
                 continue;
             }
-            // All rows count alike at first: before anything is fitted, large forces are no outliers.
+            // All rows have equal weights at first: before anything is fitted, large forces are no outliers.
             let scale = if round == 0 {
                 largest
             } else {
@@ -56,7 +58,9 @@ pub fn robust_fit(
             };
             let scale = scale.max(ROUNDING * largest);
             for i in counted() {
-                let within = (BOUND * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
+                // Huber's weight: 1 within the bound, bound / |residual| beyond.
+                let within =
+                    (AUDIT_HUBER_BOUND_SIGMAS * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
                 weights[i] = within / (scale * scale);
             }
         }
@@ -78,14 +82,14 @@ pub fn robust_fit(
     })
 }
 
-/// Values that solve normal equations with a trace of a ridge.
+/// Solves normal equations with a very small ridge; `None` if they are not positive definite.
 pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let (factor, scale) = factor_normal(normal)?;
     let solved = factor.solve(&right.component_mul(&scale));
     Some(solved.component_mul(&scale))
 }
 
-/// Normal equations of columns scaled to one, with a trace of a ridge: their factor and the scales.
+/// Factor of normal equations whose columns are scaled to one, with a very small ridge, and the scales.
 pub(super) fn factor_normal(
     mut normal: DMatrix<f64>,
 ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {

@@ -1,24 +1,27 @@
-//! Noise with a memory, and the filter that makes it white.
+//! Coloured noise as an autoregressive process, and the filter that whitens it. Input: a residual; output:
+//! coefficients, and filtered series.
 
-/// The highest order that is tried.
+/// Highest order of the process that is tried.
 const MAX_ORDER: usize = 40;
 
-/// An autoregression: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t` with white `w` (Box and Jenkins, Time Series Analysis).
+/// An autoregression: `e_t = a_1 e_(t-1) + ... + a_p e_(t-p) + w_t` with white `w` (Box and Jenkins, Time Series
+/// Analysis).
 #[derive(Clone, Debug, PartialEq)]
 pub struct AutoregressiveNoise {
     /// `a_1` to `a_p`; none for white noise.
     pub coefficients: Vec<f64>,
-    /// Standard deviation of `w`, in the unit of the residual; 0 where the residual is zero.
+    /// Standard deviation of `w`, in the unit of the residual; 0 if the residual is zero.
     pub standard_deviation: f64,
 }
 
 impl AutoregressiveNoise {
-    /// The autoregression of a residual in stretches, by the equations of Yule and Walker (recursion of Levinson and Durbin),
-    /// with the order that Schwarz' criterion takes. `floor` is the effective value of white noise that is there besides, in
-    /// the unit of the residual: a model that is nearly right leaves so little that what is left is foreseen all too well.
+    /// Estimates the process from a residual in segments by the Yule-Walker equations (Levinson-Durbin recursion), with
+    /// the order that minimises Schwarz' criterion. `floor` is the rms value of additional white noise, in the unit of
+    /// the residual: the residual of a nearly exact model would otherwise be predicted too well.
     pub fn from_residual(stretches: &[&[f64]], floor: f64) -> Self {
         let n: usize = stretches.iter().map(|s| s.len()).sum();
         let highest = MAX_ORDER.min(n / 20);
+        // Autocovariances; products never cross the border of a segment.
         let mut covariance: Vec<f64> = (0..=highest)
             .map(|lag| {
                 let of_stretch = |s: &&[f64]| -> f64 {
@@ -28,9 +31,11 @@ impl AutoregressiveNoise {
                 stretches.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
             })
             .collect();
+        // White noise adds to the variance only.
         covariance[0] += floor * floor;
         let mut best = (f64::INFINITY, Vec::new(), covariance[0]);
         let (mut a, mut variance): (Vec<f64>, f64) = (Vec::new(), covariance[0]);
+        // Levinson-Durbin: each order follows from the one before.
         for order in 0..=highest {
             if order > 0 {
                 let known: f64 = (0..order - 1)
@@ -44,9 +49,11 @@ impl AutoregressiveNoise {
                 a.push(reflection);
                 variance *= 1.0 - reflection * reflection;
             }
+            // The series is predicted exactly up to rounding; higher orders are meaningless.
             if variance <= 1e-12 * covariance[0] {
                 break;
             }
+            // Schwarz' criterion: likelihood and number of coefficients.
             let cost = n as f64 * variance.ln() + order as f64 * (n as f64).ln();
             if cost < best.0 {
                 best = (cost, a.clone(), variance);
@@ -58,8 +65,7 @@ impl AutoregressiveNoise {
         }
     }
 
-    /// A series of one stretch as it would be had its noise no memory, in standard deviations of `w`. The first numbers have
-    /// no past and come out as 0.
+    /// Whitened series of one segment, in standard deviations of `w`. The first values have no past and are 0.
     pub fn whiten(&self, series: &[f64]) -> Vec<f64> {
         let order = self.coefficients.len();
         let white = |t: usize| {

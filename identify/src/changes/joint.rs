@@ -1,30 +1,32 @@
-//! One fit of many runs: some coefficients are shared by all, others are each run's own.
+//! A joint fit of many runs: some coefficients are shared by all runs, others belong to one run. Input: additive
+//! statistics of the runs; output: values with covariance.
 //!
 //! ```text
 //! y_rd = s_d (Z_rd [x, o_r, f_r] + e)
 //! ```
 //!
-//! for run r and channel d, with shared `x`, own `o_r`, and `f_r` that are known. The scale `s_d` of a channel is 1, or unknown
-//! as well: a load of known mass in one of the runs then says it (Gautier and Briot, IEEE ICRA 2012). Own values are eliminated
-//! run by run, so that the cost grows with the number of runs and not with its cube.
+//! for run r and channel d, with shared `x`, own `o_r`, and known `f_r`. The scale `s_d` of a channel is 1, or
+//! estimated too: a load of known mass in one of the runs determines it (Gautier and Briot, IEEE ICRA 2012). Own values
+//! are eliminated run by run, so that the cost grows linearly with the number of runs.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::changes::moments::{EliminatedValues, NormalEquations};
 
-/// Steps of Gauss and Newton at most, where scales are unknown.
+/// Largest number of Gauss-Newton steps if scales are estimated.
 const STEPS: usize = 60;
-/// Steps end where they change the sum of squares by less than this part of it.
+/// Steps end when they change the sum of squares by less than this share of it.
 const CONVERGENCE_TOLERANCE: f64 = 1e-12;
 
 /// One run of a joint fit.
 #[derive(Clone, Debug)]
 pub struct JointRun {
-    /// Sums over rows of variance 1, channel by channel.
+    /// Additive statistics of rows with variance 1, `[channel]`.
     pub channels: Vec<NormalEquations>,
-    /// Columns that have values of their own in this run; columns that are neither shared nor own count as 0.
+    /// Columns with values of their own in this run; columns that are neither shared nor own nor known have the value
+    /// 0.
     pub own: Vec<usize>,
-    /// Columns whose values are known in this run.
+    /// Columns with known values in this run, as (column, value).
     pub known: Vec<(usize, f64)>,
 }
 
@@ -35,20 +37,20 @@ pub struct JointValues {
     pub values: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Which of them the runs tell.
+    /// Which of the values the runs determine.
     pub determined: Vec<bool>,
 }
 
 /// The result of a joint fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointFit {
-    /// Shared values, in the order in which they were asked for, and behind them the scales of channels, if these are unknown.
+    /// Shared values in the requested order, then the scales of the channels if these are estimated.
     pub shared: JointValues,
-    /// Own values of each run, in the order of [`Part::own`].
+    /// Own values of each run, in the order of [`JointRun::own`].
     pub own: Vec<JointValues>,
 }
 
-/// Fits all runs at once; with `scaled` the scale of each channel is unknown.
+/// Fits all runs at once; `shared` are the shared columns. If `scaled`, the scale of each channel is estimated.
 pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointFit {
     let mut at = JointIterate {
         shared: DVector::zeros(shared.len()),
@@ -58,11 +60,13 @@ pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointF
             .map(|part| DVector::zeros(part.own.len()))
             .collect(),
     };
+    // With fixed scales the problem is linear, so one step is exact.
     let mut step = GaussNewtonStep::new(parts, shared, &at, false);
     at = step.apply_step(&at, 1.0);
     if scaled {
         for _ in 0..STEPS {
             step = GaussNewtonStep::new(parts, shared, &at, true);
+            // Shorten the step until the sum of squares falls.
             let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.apply_step(&at, part));
             let rest = |point: &JointIterate| {
                 GaussNewtonStep::new(parts, shared, point, true).squares_before
@@ -82,27 +86,32 @@ pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointF
     step.result(&at)
 }
 
-/// Values on the way.
+/// Present values of an iteration.
 #[derive(Clone)]
 struct JointIterate {
+    /// Shared values.
     shared: DVector<f64>,
+    /// Scale of each channel.
     scales: Vec<f64>,
+    /// Own values of each run.
     own: Vec<DVector<f64>>,
 }
 
-/// The linear problem around a point.
+/// The linearised problem at a point, solved.
 struct GaussNewtonStep {
+    /// Solution for the shared values and the scales, relative to the point.
     solution: crate::changes::moments::NormalSolution,
-    /// Own values of each run as they follow from the shared ones.
+    /// Own values of each run as functions of the shared ones.
     own: Vec<EliminatedValues>,
     /// Sum of squares at the point.
     squares_before: f64,
-    /// Variance of what is left.
+    /// Variance of the residual, at least 1.
     noise: f64,
     scaled: bool,
 }
 
 impl GaussNewtonStep {
+    /// Linearises all runs at a point, eliminates their own values and solves for the shared ones.
     fn new(parts: &[JointRun], shared: &[usize], at: &JointIterate, scaled: bool) -> Self {
         let n = shared.len() + if scaled { at.scales.len() } else { 0 };
         let mut sum = NormalEquations::new(n);
@@ -111,6 +120,7 @@ impl GaussNewtonStep {
         for (part, values) in parts.iter().zip(&at.own) {
             let around = linearise_run(part, shared, at, values, scaled);
             before += around.total;
+            // Statistics of the shared columns after elimination add up over the runs.
             let (left, one) = around.eliminate(part.own.len());
             sum.merge(&left);
             own.push(one);
@@ -146,6 +156,7 @@ impl GaussNewtonStep {
         next
     }
 
+    /// Values at the point with covariances from the linearised problem.
     fn result(&self, at: &JointIterate) -> JointFit {
         let scales = at.scales.iter().filter(|_| self.scaled);
         let own = at
@@ -171,7 +182,7 @@ impl GaussNewtonStep {
     }
 }
 
-/// The linear problem of one run around a point: columns of its own values, of shared ones, and of scales.
+/// Normal equations of one run around a point, with columns in the order: own values, shared values, scales.
 fn linearise_run(
     part: &JointRun,
     shared: &[usize],
@@ -191,7 +202,7 @@ fn linearise_run(
         for (k, x) in &part.known {
             values[*k] = *x;
         }
-        // What the values make of the columns, and what they leave.
+        // Products of the columns with the model's forces, and with the residual.
         let made = &sums.gram * &values;
         let left = &sums.rhs - *scale * &made;
         for (i, a) in columns.iter().enumerate() {
@@ -300,7 +311,7 @@ mod tests {
         }
     }
 
-    /// A load that is known says the scales of both channels, though the load itself is seen with them alone.
+    /// A known load determines the scales of both channels.
     #[test]
     fn a_known_load_tells_scales() {
         let mut noise = TestNoise::new(5);

@@ -1,48 +1,44 @@
-//! A run as sums over its rows, which add from block to block and from run to run.
+//! A run as additive statistics of its rows: normal equations that are summed over blocks and runs.
 //!
 //! Decision: fits of any columns, omitted blocks, single runs, all runs and segments all come from the same inner
 //! products. A run of any length is a matrix of some 200 columns.
 
 use nalgebra::{DMatrix, DVector};
 
-/// A column whose rest beside the others is below this part of it says nothing of its own.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-7;
-
-/// A column of norm 1 that hangs on another by less than this hardly does.
-const WEAK_DEPENDENCE: f64 = 1e-3;
+use crate::changes::thresholds::{CHANGE_INDEPENDENCE_TOLERANCE, WEAK_DEPENDENCE};
 
 /// Inner products of all columns of a least-squares problem among themselves and with the measured values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalEquations {
-    /// `Z' Z`.
+    /// `Z' Z`, symmetric.
     pub gram: DMatrix<f64>,
     /// `Z' y`.
     pub rhs: DVector<f64>,
     /// `y' y`.
     pub total: f64,
-    /// How many rows there are.
+    /// Number of rows.
     pub rows: usize,
 }
 
 /// A least-squares solution for some of the columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalSolution {
-    /// One value for each column that was asked for; 0 for one that is a combination of those before it.
+    /// One value per column; 0 for a column that is a combination of those before it.
     pub values: DVector<f64>,
-    /// `(Z' Z)^-1`: the covariance of the values if rows are of variance 1; 0 where a value is held at 0.
+    /// `(Z' Z)^-1`: the covariance of the values if rows have variance 1; 0 where a value is fixed at 0.
     pub covariance: DMatrix<f64>,
-    /// Which values are their own, and no combination of the others.
+    /// Which values are determined individually, and not only in combination with others.
     pub determined: Vec<bool>,
-    /// What is left: `|y - Z x|^2`.
+    /// Squared residual `|y - Z x|^2`.
     pub residual_squares: f64,
-    /// How many columns say something of their own.
+    /// Number of independent columns.
     pub rank: usize,
-    /// Which columns these are: of columns that say the same the first.
+    /// Which columns these are; of several dependent columns the first.
     pub independent: Vec<bool>,
 }
 
 impl NormalEquations {
-    /// Of no rows.
+    /// Normal equations without rows.
     pub fn new(columns: usize) -> Self {
         Self {
             gram: DMatrix::zeros(columns, columns),
@@ -52,8 +48,9 @@ impl NormalEquations {
         }
     }
 
-    /// Adds rows by their columns, `z[column][row]` with `None` for a column of zeros, and the measured values.
+    /// Adds rows given by columns, `z[column][row]` with `None` for a column of zeros, and the measured values.
     pub fn add_rows(&mut self, z: &[Option<&[f64]>], y: &[f64]) {
+        // Columns of zeros add nothing, so only the others are multiplied.
         let moving: Vec<(usize, &[f64])> = (z.iter().enumerate())
             .filter_map(|(k, column)| Some((k, (*column)?)))
             .collect();
@@ -73,7 +70,7 @@ impl NormalEquations {
         self.rows += y.len();
     }
 
-    /// Adds the rows of another one with the same columns.
+    /// Adds the rows of other normal equations with the same columns.
     pub fn merge(&mut self, other: &Self) {
         self.gram += &other.gram;
         self.rhs += &other.rhs;
@@ -81,7 +78,7 @@ impl NormalEquations {
         self.rows += other.rows;
     }
 
-    /// The same with rows of another weight.
+    /// The same with all rows multiplied by the root of a weight.
     #[must_use]
     pub fn scale_weight(&self, weight: f64) -> Self {
         Self {
@@ -110,7 +107,7 @@ impl NormalEquations {
         (self.total - 2.0 * self.rhs.dot(x) + x.dot(&(&self.gram * x))).max(0.0)
     }
 
-    /// The columns from `fitted` on, beside those before it.
+    /// The columns from `fitted` on, with those before them eliminated.
     pub(crate) fn schur_complement(&self, fitted: usize) -> SchurComplement {
         let (mut table, _) = self.scaled_equations();
         for k in 0..fitted {
@@ -122,7 +119,8 @@ impl NormalEquations {
         }
     }
 
-    /// Eliminates the first columns: what is left for the others, and how the first follow from them.
+    /// Eliminates the first columns. Returns the normal equations of the others, and the first values as functions of
+    /// the others.
     pub(crate) fn eliminate(&self, first: usize) -> (Self, EliminatedValues) {
         let (mut table, scale) = self.scaled_equations();
         let n = self.rhs.len();
@@ -137,6 +135,7 @@ impl NormalEquations {
             total: table[(n, n)].max(0.0),
             rows: self.rows,
         };
+        // Undo the scaling; dependent columns have the value 0.
         let of = |i: usize, x: f64| {
             if kept[i] {
                 divide_by_scale(x, scale[i])
@@ -158,6 +157,7 @@ impl NormalEquations {
             }),
             determined: (0..first)
                 .map(|i| {
+                    // A fixed column that depends on this one makes it undetermined.
                     let is_free = |k: usize| {
                         kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE
                     };
@@ -176,7 +176,8 @@ impl NormalEquations {
         (left, eliminated)
     }
 
-    /// The normal equations with columns of norm 1, and these norms; the last row and column are those of the measured values.
+    /// The normal equations with columns scaled to norm 1, and these norms. The last row and column belong to the
+    /// measured values.
     fn scaled_equations(&self) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.rhs.len();
         let scale = DVector::from_fn(n, |i, _| self.gram[(i, i)].sqrt());
@@ -189,8 +190,8 @@ impl NormalEquations {
         (table, scale)
     }
 
-    /// Least squares for all columns, by sweeps of the scaled normal equations; columns that say nothing of their own are held
-    /// at 0.
+    /// Least squares solution for all columns, by sweeps of the scaled normal equations; dependent columns are fixed at
+    /// 0.
     pub fn solve(&self) -> NormalSolution {
         let n = self.rhs.len();
         let (mut table, scale) = self.scaled_equations();
@@ -202,7 +203,7 @@ impl NormalEquations {
                 0.0
             }
         };
-        // A column that was held is a combination of kept ones, which therefore are not determined.
+        // A column that was fixed is a combination of kept ones, which therefore are not determined.
         let determined = |i: usize| {
             kept[i]
                 && (0..n)
@@ -225,19 +226,20 @@ impl NormalEquations {
     }
 }
 
-/// Values that follow from others: `o = a - B x`.
+/// Values as functions of others: `o = a - B x`.
 #[derive(Clone, Debug)]
 pub(crate) struct EliminatedValues {
-    /// `a`.
+    /// The vector `a`.
     offset: DVector<f64>,
-    /// `B`.
+    /// The matrix `B`.
     coefficients: DMatrix<f64>,
-    /// Their covariance for given others.
+    /// Their covariance if the others are known exactly.
     covariance: DMatrix<f64>,
-    /// Which of them are told by themselves for given others.
+    /// Which of them are determined if the others are known.
     determined: Vec<bool>,
-    /// Which others each of them hangs on.
+    /// Which others each of them depends on.
     depends_on: Vec<Vec<bool>>,
+    /// Number of independent columns among them.
     rank: usize,
 }
 
@@ -252,7 +254,7 @@ impl EliminatedValues {
         &self.covariance + &self.coefficients * others * self.coefficients.transpose()
     }
 
-    /// Which of them are told, where these of the others are.
+    /// Which of them are determined, given which of the others are.
     pub(crate) fn determined_flags(&self, others: &[bool]) -> Vec<bool> {
         let is_told = |(alone, hangs): (&bool, &Vec<bool>)| {
             *alone
@@ -268,25 +270,26 @@ impl EliminatedValues {
             .collect()
     }
 
-    /// How many say something of their own.
+    /// Number of independent columns among the eliminated ones.
     pub(crate) fn rank(&self) -> usize {
         self.rank
     }
 }
 
+/// `x / scale`, or 0 for a column of zeros.
 fn divide_by_scale(x: f64, scale: f64) -> f64 {
     if scale > 0.0 { x / scale } else { 0.0 }
 }
 
-/// What columns say beside others that are fitted with them.
+/// Columns after the elimination of others that are always fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct SchurComplement {
-    /// Their scaled normal equations with those of the others eliminated; the last row and column are the measured values'.
+    /// Their scaled normal equations with the others eliminated; the last row and column belong to the measured values.
     table: DMatrix<f64>,
 }
 
 impl SchurComplement {
-    /// What fitting some of the columns leaves, and which of them say something of their own.
+    /// Squared residual after a fit of some of the columns, and which of these are independent.
     pub(crate) fn residual_squares(&self, columns: &[usize]) -> (f64, Vec<bool>) {
         let last = self.table.nrows() - 1;
         let all: Vec<usize> = columns.iter().copied().chain([last]).collect();
@@ -296,11 +299,11 @@ impl SchurComplement {
     }
 }
 
-/// Sweeps a symmetric table on one of its columns, if that says something of its own: it then holds minus the regression of
-/// all others upon it (Goodnight, The American Statistician 33, 1979).
+/// Sweeps a symmetric table on one of its columns, if that is independent: the table then contains the regression of
+/// all others on it (Goodnight, The American Statistician 33, 1979). Returns whether it did.
 fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
     let pivot = table[(k, k)];
-    if pivot < INDEPENDENCE_TOLERANCE {
+    if pivot < CHANGE_INDEPENDENCE_TOLERANCE {
         return false;
     }
     let n = table.nrows();

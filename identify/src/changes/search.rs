@@ -1,43 +1,34 @@
-//! The fewest changes that explain what a later run does not share with the one before.
+//! Search for the fewest changes that explain the difference between two runs. Input: normal equations of both runs and
+//! possible changes; output: selected changes with values.
 //!
-//! Decision: nothing changed within a run. Standard deviations count noise, and not what a model lacks along one
-//! motion and not along another. So parts of one run are compared like runs; between runs a change must explain
+//! Decision: nothing changed within a run. Standard deviations count noise only, and not model errors that appear along
+//! one motion and not along another. So parts of one run are compared like two runs; between runs a change must explain
 //! twice what it explains there. On four real arms this removes every false change, at the price of small true ones
 //! where the model is poor.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
+use crate::changes::thresholds::{
+    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO,
+    MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
+};
 
-/// How many times the logarithm of the number of rows a value must gain: 1 is Schwarz' criterion, which holds for white noise;
-/// what is left of real runs is never quite white.
-const STRICTER: f64 = 3.0;
-/// The part of a change's gain that must be there on blocks that had no part in its fit.
-const MIN_VALIDATION_SHARE: f64 = 0.3;
-/// A change must explain so many times what parts of one run differ by among themselves: motions of two runs have less in
-/// common than parts of one.
-const MIN_SPREAD_RATIO: f64 = 2.0;
-/// A change must stand so many deviations clear of none. Deviations count the noise alone: parts of one run show much of what a
-/// model lacks, but not what it lacks along the other motion.
-const MIN_SIGNIFICANCE: f64 = 12.0;
-/// Changes that differ by less than this part of the gain cannot be told apart.
-const RIVAL_TOLERANCE: f64 = 0.02;
-
-/// Two runs as sums over rows of variance 1, block by block and over the same columns.
+/// Two runs as normal equations of rows with variance 1, block by block and with the same columns.
 #[derive(Clone, Debug)]
 pub struct RunPair {
-    /// The run before.
+    /// Blocks of the earlier run.
     pub reference: Vec<NormalEquations>,
-    /// The later run.
+    /// Blocks of the later run.
     pub later: Vec<NormalEquations>,
-    /// By what parts of one run differ among themselves: the larger of what [`within`] says of the two.
+    /// Differences within one run: the larger result of [`within_run_spread`] for the two runs.
     pub within_run_spread: f64,
 }
 
-/// What is asked of two runs.
+/// Possible explanations of the difference of two runs.
 #[derive(Clone, Debug)]
 pub struct ChangeHypotheses {
-    /// Columns whose coefficients both runs share: those of the model, and those of what it may lack in both.
+    /// Columns whose coefficients both runs share: those of the model, and those of effects that it may lack in both.
     pub shared: Vec<usize>,
     /// The changes that are possible.
     pub changes: Vec<PossibleChange>,
@@ -46,39 +37,40 @@ pub struct ChangeHypotheses {
 /// A change that is possible.
 #[derive(Clone, Debug)]
 pub struct PossibleChange {
-    /// Its columns, which have coefficients of their own in the later run.
+    /// Its columns, which have own coefficients in the later run.
     pub columns: Vec<usize>,
-    /// The most values that it is charged for; fewer than it has where they move together as a rule.
+    /// Largest number of values in its price; lower than the number of columns if they usually change together.
     pub max_charged_values: usize,
-    /// What it is charged besides, in values, for being rarer than others.
+    /// Additional price for a rare change, in values.
     pub rarity: f64,
 }
 
 /// A change that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SelectedChange {
-    /// Which of the possible ones.
+    /// Index among the possible changes.
     pub candidate: usize,
-    /// The values of its columns.
+    /// Changes of the coefficients of its columns.
     pub values: DVector<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Which values are known by themselves.
+    /// Which of the values are determined individually.
     pub determined: Vec<bool>,
-    /// By how much the sum of squares would rise without it, over the variance of what is left.
+    /// Increase of the sum of squares without it, relative to the variance of the residual.
     pub gain: f64,
-    /// The same on blocks that had no part in the fit.
+    /// The same on blocks that were not fitted.
     pub validation_gain: f64,
-    /// Changes that explain nearly as much in its place.
+    /// Indices of changes that explain nearly as much in its place.
     pub rivals: Vec<usize>,
 }
 
-/// The fewest changes that explain the later run, the largest first; none where the runs differ by chance alone, or by no more
-/// than parts of one run do.
+/// Finds the fewest changes that explain the later run, sorted by gain. Empty if the runs differ by chance only, or by
+/// no more than parts of one run do.
 pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<SelectedChange> {
     let bench = ChangeSelector::new(runs, search);
     let mut chosen: Vec<usize> = Vec::new();
     loop {
+        // Forward: add the change with the lowest cost, then exchange members.
         let candidates = (0..search.changes.len()).filter(|g| !chosen.contains(g));
         let tried = candidates.map(|g| (g, bench.penalised_residual(&add_index(&chosen, g))));
         let Some((best, cost)) = tried.min_by(|a, b| a.1.total_cmp(&b.1)) else {
@@ -90,7 +82,7 @@ pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<Selected
         chosen.push(best);
         bench.improve_selection(&mut chosen);
     }
-    // What the exchanges have made small goes again.
+    // Remove changes whose gain has become too small by the exchanges.
     while let Some(at) = (0..chosen.len()).find(|at| {
         let rest = remove_index(&chosen, chosen[*at]);
         bench.squares_gain(&rest, chosen[*at]) < bench.min_gain
@@ -105,8 +97,8 @@ pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<Selected
     found
 }
 
-/// By how much each change, with no other beside it, lowers the sum of squares, over the variance of what all of them leave; of
-/// many machines this says what is usual among them.
+/// Decrease of the sum of squares by each change alone, relative to the variance of the residual of all changes. Over
+/// many machines this shows what is usual.
 pub fn single_change_gains(runs: &RunPair, search: &ChangeHypotheses) -> Vec<f64> {
     let bench = ChangeSelector::new(runs, search);
     (0..search.changes.len())
@@ -114,7 +106,7 @@ pub fn single_change_gains(runs: &RunPair, search: &ChangeHypotheses) -> Vec<f64
         .collect()
 }
 
-/// One change with no other beside it, whatever it explains.
+/// Fits a single change, however little it explains.
 pub fn fit_single_change(
     runs: &RunPair,
     search: &ChangeHypotheses,
@@ -123,11 +115,12 @@ pub fn fit_single_change(
     ChangeSelector::new(runs, search).build_change(&[which], which)
 }
 
-/// By what parts of one run differ among themselves: the largest sum of squares that a single change between parts of it explains,
-/// over the rows that a difference of its parts is worth. Noise makes it small; what a model lacks, and friction that drifts, make
-/// it large, and then the same must be expected between two runs.
+/// Differences within one run: the largest sum of squares that a single change between parts of it explains, relative
+/// to the effective number of rows of the difference. Noise alone makes it small. Model errors and drifting friction
+/// make it large, and then the same must be expected between two runs.
 pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) -> f64 {
     let n = blocks.len();
+    // Compare the first half with the second, and each quarter with the rest.
     let halves = [(0, n / 2)];
     let quarters = (0..4).map(|k| (k * n / 4, (k + 1) * n / 4));
     let mut most = 0.0_f64;
@@ -148,6 +141,7 @@ pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) 
         }
         let bench = ChangeSelector::new(&runs, search);
         for (g, candidate) in search.changes.iter().enumerate() {
+            // Only the part above what the best of all changes gains by chance.
             let beyond = bench.squares_gain(&[], g)
                 - chance_gain(candidate.columns.len(), search.changes.len());
             most = most.max(beyond * bench.noise / worth);
@@ -156,18 +150,19 @@ pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) 
     most
 }
 
-/// What the best of some changes with so many values gains by chance, which it seldom exceeds (Laurent and Massart, Annals of
-/// Statistics 28, 2000).
+/// Gain of the best of some changes by chance, which is rarely exceeded; `values` is the number of its values (Laurent
+/// and Massart, Annals of Statistics 28, 2000).
 fn chance_gain(values: usize, changes: usize) -> f64 {
-    let (k, tail) = (values as f64, (10.0 * changes as f64).ln());
+    let (k, tail) = (values as f64, (CHANCE_GAIN_RARITY * changes as f64).ln());
     k + 2.0 * (k * tail).sqrt() + 2.0 * tail
 }
 
+/// Number of rows of all blocks.
 fn count_rows(blocks: &[NormalEquations]) -> f64 {
     blocks.iter().map(|block| block.rows).sum::<usize>() as f64
 }
 
-/// How many rows a difference between two runs is worth.
+/// Effective number of rows of a difference between two runs: half the harmonic mean of both.
 fn effective_rows([a, b]: [f64; 2]) -> f64 {
     if a > 0.0 && b > 0.0 {
         a * b / (a + b)
@@ -176,7 +171,7 @@ fn effective_rows([a, b]: [f64; 2]) -> f64 {
     }
 }
 
-/// All blocks but one.
+/// Sum of all blocks except one.
 fn sum_except(blocks: &[NormalEquations], but: Option<usize>) -> NormalEquations {
     let mut sum = NormalEquations::new(blocks.first().map_or(0, |block| block.rhs.len()));
     for (_, block) in blocks.iter().enumerate().filter(|(k, _)| Some(*k) != but) {
@@ -185,15 +180,17 @@ fn sum_except(blocks: &[NormalEquations], but: Option<usize>) -> NormalEquations
     sum
 }
 
+/// A set with one more index.
 fn add_index(chosen: &[usize], further: usize) -> Vec<usize> {
     chosen.iter().copied().chain([further]).collect()
 }
 
+/// A set without one index.
 fn remove_index(chosen: &[usize], one: usize) -> Vec<usize> {
     chosen.iter().copied().filter(|g| *g != one).collect()
 }
 
-/// Rows of both runs together: the shared columns, and behind them those of changes, which are the later run's alone.
+/// Normal equations of both runs together: the shared columns, then those of changes, which only the later run has.
 fn stack_runs(
     [reference, later]: [&NormalEquations; 2],
     shared: &[usize],
@@ -211,25 +208,30 @@ fn stack_runs(
     all
 }
 
+/// Evaluates sets of changes between two runs.
 struct ChangeSelector<'a> {
+    /// Blocks of both runs.
     runs: &'a RunPair,
+    /// Shared columns and possible changes.
     search: &'a ChangeHypotheses,
-    /// Columns that both runs share and that say something of their own.
+    /// Shared columns that are independent.
     shared: Vec<usize>,
-    /// All blocks of both runs.
+    /// Sums over all blocks of each run.
     sums: [NormalEquations; 2],
-    /// What the columns of all changes, one after the other, say beside the shared ones, and where each change begins.
+    /// Columns of all changes, one after the other, with the shared ones eliminated; and the first column of each
+    /// change.
     complement: SchurComplement,
     starts: Vec<usize>,
-    /// Variance of what no change explains.
+    /// Variance of the residual with all changes fitted, at least 1.
     noise: f64,
-    /// What a value must gain.
+    /// Price of a value.
     value_price: f64,
-    /// What a change must gain, whatever it is.
+    /// Least gain of a change.
     min_gain: f64,
 }
 
 impl<'a> ChangeSelector<'a> {
+    /// Eliminates the shared columns and determines noise and prices.
     fn new(runs: &'a RunPair, search: &'a ChangeHypotheses) -> Self {
         let sums = [
             sum_except(&runs.reference, None),
@@ -237,6 +239,7 @@ impl<'a> ChangeSelector<'a> {
         ];
         let mut all = sums[0].select_columns(&search.shared);
         all.merge(&sums[1].select_columns(&search.shared));
+        // Shared columns that are combinations of others are dropped.
         let telling = all.solve().independent;
         let shared = search.shared.iter().zip(telling);
         let rows = (sums[0].rows + sums[1].rows) as f64;
@@ -255,6 +258,7 @@ impl<'a> ChangeSelector<'a> {
             starts.push(starts[starts.len() - 1] + candidate.columns.len());
         }
         let changes: Vec<usize> = (0..starts[search.changes.len()]).collect();
+        // The noise is what remains when all changes are fitted at once.
         let (rest, kept) = beside.residual_squares(&changes);
         let rank = shared.len() + kept.iter().filter(|kept| **kept).count();
         let noise = (rest / (rows - rank as f64).max(1.0)).max(1.0);
@@ -266,25 +270,27 @@ impl<'a> ChangeSelector<'a> {
             complement: beside,
             starts,
             noise,
-            value_price: STRICTER * rows.max(2.0).ln(),
+            value_price: CHANGE_VALUE_PRICE * rows.max(2.0).ln(),
             min_gain: (MIN_SPREAD_RATIO * runs.within_run_spread * worth / noise)
                 .max(MIN_SIGNIFICANCE * MIN_SIGNIFICANCE),
             sums,
         }
     }
 
-    /// The shared columns, and once more those of some changes.
+    /// The shared columns, followed by those of some changes.
     fn columns(&self, chosen: &[usize]) -> Vec<usize> {
         let of = |g: &usize| self.search.changes[*g].columns.iter().copied();
         let shared = self.shared.iter().copied();
         shared.chain(chosen.iter().flat_map(of)).collect()
     }
 
+    /// Least squares solution with some changes.
     fn solve_changes(&self, chosen: &[usize]) -> NormalSolution {
         stack_runs(self.sums.each_ref(), &self.shared, &self.columns(chosen)).solve()
     }
 
-    /// What some changes leave, over the variance of the noise, and how many values they are charged for.
+    /// Squared residual with some changes, relative to the variance of the noise, and the number of values in their
+    /// price.
     fn residual_and_charges(&self, chosen: &[usize]) -> (f64, f64) {
         let columns = chosen
             .iter()
@@ -305,19 +311,19 @@ impl<'a> ChangeSelector<'a> {
         (rest / self.noise, charged)
     }
 
-    /// By how much a further change lowers the sum of squares, over the variance of the noise.
+    /// Decrease of the sum of squares by a further change, relative to the variance of the noise.
     fn squares_gain(&self, chosen: &[usize], further: usize) -> f64 {
         self.residual_and_charges(chosen).0
             - self.residual_and_charges(&add_index(chosen, further)).0
     }
 
-    /// What some changes leave, with a price on each value.
+    /// Squared residual with some changes plus the price of their values.
     fn penalised_residual(&self, chosen: &[usize]) -> f64 {
         let (rest, charged) = self.residual_and_charges(chosen);
         rest + self.value_price * charged
     }
 
-    /// Takes out and exchanges for as long as that costs less.
+    /// Removes or exchanges changes as long as that lowers the cost.
     fn improve_selection(&self, chosen: &mut Vec<usize>) {
         loop {
             let now = self.penalised_residual(chosen);
@@ -340,7 +346,7 @@ impl<'a> ChangeSelector<'a> {
         }
     }
 
-    /// By how much a further change lowers the sum of squares, and by how much on blocks that had no part in the fit.
+    /// Decrease of the sum of squares by a further change, in the fit and on blocks that were not fitted.
     fn fit_and_validation_gain(&self, chosen: &[usize], further: usize) -> (f64, f64) {
         let both = add_index(chosen, further);
         let gain = self.squares_gain(chosen, further);
@@ -353,6 +359,7 @@ impl<'a> ChangeSelector<'a> {
                 let others = sum_except(blocks, Some(k));
                 let mut sums = self.sums.each_ref();
                 sums[run] = &others;
+                // Squared residual of the omitted block; the earlier run has no changes.
                 let rest = |set: &[usize]| {
                     let both = stack_runs(sums, &self.shared, &self.columns(set));
                     let values = both.solve().values;
@@ -366,8 +373,9 @@ impl<'a> ChangeSelector<'a> {
         (gain, held_out)
     }
 
+    /// Whether a further change gains enough, in the fit and on blocks that were not fitted.
     fn is_supported(&self, chosen: &[usize], further: usize) -> bool {
-        // Held-out blocks take the most time, and most candidates fail before.
+        // Validation needs the most time, and most candidates fail before.
         if self.squares_gain(chosen, further) <= self.min_gain {
             return false;
         }
@@ -375,6 +383,7 @@ impl<'a> ChangeSelector<'a> {
         gain > self.min_gain && held_out > MIN_VALIDATION_SHARE * gain
     }
 
+    /// The result for one of the chosen changes: values, gains and rivals.
     fn build_change(&self, chosen: &[usize], which: usize) -> SelectedChange {
         let rest = remove_index(chosen, which);
         let order = add_index(&rest, which);
@@ -406,8 +415,8 @@ mod tests {
 
     const ROWS: usize = 400;
 
-    /// Runs with three base columns; the later one has changes of one, two and one columns, of which the second column of
-    /// the second is a twin of the first base column.
+    /// Runs with three base columns; the later one has changes of one, two and one columns, of which the second column
+    /// of the second is a twin of the first base column.
     fn runs(seed: u64, changed: &[(usize, f64)]) -> RunPair {
         let mut noise = TestNoise::new(seed);
         let mut moments = |extra: bool| {
@@ -462,7 +471,7 @@ mod tests {
             assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);
             assert!(single.validation_gain > 0.5 * single.gain && single.rivals.is_empty());
-            // Each by itself gains as much as it does beside the other: their columns have little in common.
+            // Each alone gains as much as in addition to the other: their columns have little in common.
             let alone_gain = single_change_gains(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
             assert!(alone_gain[0] < 0.1 * alone_gain[2] && alone_gain[2] < 1.5 * single.gain);
             let one = fit_single_change(&runs(seed, &[(6, 0.6)]), &possible(), 2);

@@ -1,5 +1,5 @@
-//! A fitted set of effects, and what further columns explain beside it: all from inner products, so that no sample is touched
-//! again.
+//! A fitted set of effects, and what further columns explain in addition. Everything is computed from inner products,
+//! so that samples are not read again.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,33 +7,36 @@ use super::bench::{EffectSelector, SelectedEffect};
 use super::column::ForceColumn;
 use super::factored::GramFactor;
 use super::pool::{FitScope, solve_gram};
+use super::thresholds::EFFECT_INDEPENDENCE_TOLERANCE;
 
-/// A column of which the others leave a smaller share of squares than this says nothing new.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-6;
-/// Shares of a column's squares below this are rounding.
+/// A smaller share of a column's squares than this is rounding.
 const ROUNDING: f64 = 1e-7;
 
-/// A set that is fitted to all samples with the base parameters.
+/// A set of effects that is fitted to all samples together with the base parameters.
 #[derive(Default)]
 pub(crate) struct ConditioningSet {
-    /// Its columns, those of the base first.
+    /// Indices of its columns in the pool, base first.
     columns: Vec<usize>,
+    /// Factor of their weighted inner products.
     factor: GramFactor,
+    /// Estimated factor of each column, in the same order.
     pub(crate) factors: DVector<f64>,
+    /// Weighted sum of squares of the residual.
     squares: f64,
 }
 
-/// Weighted inner products of some columns.
+/// Weighted inner products of some further columns.
 struct InnerProductBlocks {
-    /// With each other.
+    /// With each other; symmetric.
     own: DMatrix<f64>,
-    /// With those of the set, a column for each.
+    /// With the columns of the set: a row for each column of the set, a column for each further one.
     with_set: DMatrix<f64>,
     /// With the measured forces.
     measured: DVector<f64>,
 }
 
 impl EffectSelector<'_> {
+    /// Fits a set of effects to all samples and keeps what is needed to evaluate further columns.
     pub(crate) fn conditioning_set(&self, picks: &[SelectedEffect]) -> ConditioningSet {
         let mut all = self.columns(picks);
         all.push(self.measured);
@@ -49,12 +52,12 @@ impl EffectSelector<'_> {
         }
     }
 
-    /// By how much columns of the pool would lower the weighted sum of squares beside a set.
+    /// Decrease of the weighted sum of squares when columns of the pool are added to a set.
     pub(crate) fn explained_squares(&self, columns: &[usize], beside: &ConditioningSet) -> f64 {
         beside.explained_squares(&self.products_of(columns, beside))
     }
 
-    /// The same of columns that are not in the pool.
+    /// The same for columns that are not in the pool.
     pub(crate) fn explained_by_columns(
         &self,
         columns: &[ForceColumn],
@@ -73,10 +76,11 @@ impl EffectSelector<'_> {
         })
     }
 
-    /// How many of some columns say something that a set does not say already.
+    /// Number of columns that are linearly independent of a set and of each other.
     pub(crate) fn conditional_rank(&self, columns: &[usize], beside: &ConditioningSet) -> usize {
         let products = self.products_of(columns, beside);
         let mut left = beside.project_out_set(&products);
+        // Scale columns to unit length, so that the tolerance is relative.
         let scale = products
             .own
             .diagonal()
@@ -89,11 +93,11 @@ impl EffectSelector<'_> {
         let values = left.symmetric_eigenvalues();
         values
             .iter()
-            .filter(|value| **value > INDEPENDENCE_TOLERANCE)
+            .filter(|value| **value > EFFECT_INDEPENDENCE_TOLERANCE)
             .count()
     }
 
-    /// Whether some columns lie in the span of others and a set.
+    /// Whether all columns of `some` lie in the span of `others` and a set.
     pub(crate) fn is_in_joint_span(
         &self,
         some: &[usize],
@@ -103,14 +107,16 @@ impl EffectSelector<'_> {
         let all = [others, some].concat();
         let products = self.products_of(&all, beside);
         let left = beside.project_out_set(&products);
+        // Squares of each column that remain after a fit of the others.
         (others.len()..all.len()).all(|k| {
             let mut which: Vec<usize> = (0..others.len()).collect();
             which.push(k);
             let gram = left.select_rows(&which).select_columns(&which);
-            solve_gram(&gram).1 <= INDEPENDENCE_TOLERANCE * products.own[(k, k)]
+            solve_gram(&gram).1 <= EFFECT_INDEPENDENCE_TOLERANCE * products.own[(k, k)]
         })
     }
 
+    /// Weighted inner products of columns of the pool.
     fn products_of(&self, columns: &[usize], beside: &ConditioningSet) -> InnerProductBlocks {
         let product = |a: usize, b: usize| self.pool.weighted_product(a, b, &self.weights);
         let (n, m) = (columns.len(), beside.columns.len());
@@ -123,7 +129,8 @@ impl EffectSelector<'_> {
 }
 
 impl ConditioningSet {
-    /// What the set leaves of inner products; what is rounding beside a column's own is nothing.
+    /// Inner products with the set projected out: `G - H' H` with `H = L^-1 C` (Schur complement). A diagonal entry at
+    /// the level of rounding becomes zero.
     fn project_out_set(&self, products: &InnerProductBlocks) -> DMatrix<f64> {
         let halves = self.factor.forward_substitute(&products.with_set);
         let mut left = &products.own - halves.transpose() * &halves;
@@ -135,8 +142,10 @@ impl ConditioningSet {
         left
     }
 
+    /// Decrease of the weighted sum of squares for columns with given inner products.
     fn explained_squares(&self, products: &InnerProductBlocks) -> f64 {
         let n = products.own.nrows();
+        // Products of the columns with the residual of the set.
         let right = &products.measured - products.with_set.transpose() * &self.factors;
         let mut gram = self.project_out_set(products).resize(n + 1, n + 1, 0.0);
         for i in 0..n {

@@ -1,32 +1,34 @@
-//! A further body: forces are linear in its mass, first moments and inertia, of which the inertia follows from where its mass
-//! is. So it is posed as a mass at a place, with what it spreads about that, and is possible whenever these are positive.
+//! An additional body (payload). Forces are linear in its mass, first moments and inertia, and the inertia depends on
+//! the position of its mass. So its parameters are a mass at a position and the spread about it; the body is physically
+//! possible if these are positive.
 //!
-//! Decision: ten free parameters span what a spring, a weight or a gear does, and most of their values are no
-//! possible body. Mass and first moments with the inertia that follows from them are four, possible by one sign;
-//! how the mass spreads is three more, tried afterwards. Forces are of first degree in all of them, so columns that
-//! are derivatives add up to the whole force (Euler), and a few iterations find the place. With free base
-//! parameters a payload adds nothing, exactly, and is not tried.
+//! Decision: ten independent parameters span what a spring, a weight or a gear does, and most of their values are no
+//! possible body. Mass and first moments with the inertia that follows from them are four, possible by one sign; the
+//! spread of the mass is three more, tried afterwards. Forces are homogeneous of degree one in all of them, so columns
+//! that are derivatives add up to the complete force (Euler), and a few iterations find the position. With estimated
+//! base parameters a payload adds nothing, exactly, and is not tried.
 
 use super::column::ForceColumn;
 
 /// Entries of an inertia matrix in the order of columns, by axes.
 const ENTRIES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// A body that is added to one that the model has; its parameters are the mass (kg), the first moments along x, y and z
-/// (kg m), and the second moments about its centre along x, y and z (kg m^2), those of them that are free.
+/// A body that is attached to a body of the model. Its parameters are the mass (kg), the first moments along x, y and z
+/// (kg m), and the second moments about its centre along x, y and z (kg m^2); `estimated` selects some of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AttachedBody {
-    /// What each of its ten parameters about the frame's origin adds to the forces: mass, first moments x, y, z, entries of the
+    /// Columns of its ten inertial parameters about the frame's origin: mass, first moments x, y, z, entries of the
     /// inertia matrix xx, xy, xz, yy, yz, zz.
     pub inertial_columns: [ForceColumn; 10],
-    /// Which of the seven are free, in order.
+    /// Which of the seven parameters are estimated, in order.
     pub estimated: Vec<usize>,
-    /// The farthest from the frame's origin that its centre may be, m.
+    /// Largest distance of its centre from the frame's origin, m.
     pub max_distance: f64,
 }
 
 impl AttachedBody {
-    /// Where the centre is for values of the free parameters; the origin where no mass is free or found.
+    /// Position of the centre in the frame, m, for values of the estimated parameters; the origin if the mass is not
+    /// estimated or not positive.
     pub(crate) fn centre(&self, values: &[f64]) -> [f64; 3] {
         let value = |of: usize| {
             let at = self.estimated.iter().position(|free| *free == of);
@@ -38,11 +40,11 @@ impl AttachedBody {
         }
         let centre = [1, 2, 3].map(|k| value(k) / mass);
         let far = centre.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // A mass that is all but none may seem to be anywhere.
+        // A very small mass has an ill-determined centre, which is limited to the largest distance.
         centre.map(|c| c * (self.max_distance / far.max(f64::MIN_POSITIVE)).min(1.0))
     }
 
-    /// Whether values of the free parameters put the centre where nothing of the machine is.
+    /// Whether values of the estimated parameters put the centre beyond the largest distance.
     pub(crate) fn is_out_of_reach(&self, values: &[f64]) -> bool {
         let of = |quantity: usize| self.estimated.iter().position(|free| *free == quantity);
         let Some(mass) = of(0).map(|at| values[at]) else {
@@ -52,8 +54,9 @@ impl AttachedBody {
         moments.iter().map(|h| h * h).sum::<f64>().sqrt() > self.max_distance * mass
     }
 
-    /// Columns of the free parameters with the centre at a place: what forces change by with each. They add up to the whole
-    /// force there, since the inertia is of first degree in mass and first moments (Euler).
+    /// Columns of the estimated parameters: derivatives of the forces at a position of the centre, m. Times the
+    /// parameters they add up to the complete force, since the inertia is homogeneous of degree one in mass and first
+    /// moments (Euler).
     pub(crate) fn columns(&self, centre: [f64; 3]) -> Vec<ForceColumn> {
         let squares: f64 = centre.iter().map(|c| c * c).sum();
         let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
@@ -87,7 +90,7 @@ impl AttachedBody {
 mod tests {
     use super::*;
 
-    /// Ten columns that tell the ten parameters apart.
+    /// Ten columns that distinguish the ten parameters.
     fn told() -> [ForceColumn; 10] {
         std::array::from_fn(|k| {
             let mut values = vec![0.0; 10];
@@ -140,7 +143,7 @@ mod tests {
         }
     }
 
-    /// Columns are what forces change by: differences of the whole force agree with them.
+    /// Columns are derivatives of the forces: differences of the complete force agree with them.
     #[test]
     fn columns_are_derivatives() {
         let body = AttachedBody {

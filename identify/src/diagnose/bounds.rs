@@ -1,5 +1,5 @@
-//! What a set of effects leaves at least, without a fit of its own: of a million sets only those are fitted that may be among
-//! the best.
+//! Lower bounds of the residual of a set, without a fit: of a million sets only those are fitted that may be among the
+//! best.
 
 use nalgebra::DMatrix;
 
@@ -7,26 +7,28 @@ use super::bench::{EffectSelector, ProjectedGram, SelectedEffect};
 use super::factored::GramFactor;
 use super::problem::{ColumnSource, SignConstraint};
 
-/// Columns of what is added to a set that are looked at; with more nothing is said.
+/// Largest number of added columns; with more the bound is zero.
 const MOST: usize = 7;
-/// A column of which the others leave a smaller share of squares than this explains nothing. Fits pass over more.
+/// An added column explains nothing if less than this share of its squares remains after the projection on the others.
+/// The limit is lower than that of fits, so that the bound stays a lower bound.
 const NEGLIGIBLE_SHARE: f64 = 1e-12;
-/// Squares are known to this share of those that the set leaves.
+/// Rounding error of squares, relative to those of the residual of the set.
 const ROUNDING: f64 = 1e-9;
 
-/// A set of which it is asked what further effects would leave.
+/// A fitted set, prepared for bounds on the residual with further effects.
 pub(crate) struct ExtensionBound<'a> {
+    /// Inner products of all columns, with the base projected out.
     table: &'a ProjectedGram,
-    /// What the set explains: for each column of the table a half of its inner products.
+    /// What the set explains: `L^-1 c` for the products `c` of each column of the table with the set, as columns.
     halves: DMatrix<f64>,
-    /// Squares that the set leaves.
+    /// Squared residual of the set.
     squares: f64,
-    /// Numbers that are free in the set at least.
+    /// Least number of estimated values in the set.
     freedoms: usize,
 }
 
 impl EffectSelector<'_> {
-    /// A set in a table that holds its columns and those of what may be added.
+    /// Prepares a set; the table must contain its columns and those that may be added.
     pub(crate) fn extension_bound<'a>(
         &self,
         table: &'a ProjectedGram,
@@ -36,6 +38,7 @@ impl EffectSelector<'_> {
         let places: Vec<usize> = columns.map(|k| table.row_of_column[*k]).collect();
         let n = places.len();
         let own = DMatrix::from_fn(n, n, |i, j| table.gram[(places[i], places[j])]);
+        // Cholesky factor of the set's own products; it projects the set out of every other column.
         let factor = GramFactor::new(&own);
         let with = DMatrix::from_fn(n, table.gram.nrows(), |i, j| table.gram[(places[i], j)]);
         let halves = factor.forward_substitute(&with);
@@ -50,7 +53,7 @@ impl EffectSelector<'_> {
         beyond
     }
 
-    /// The criterion of a set and further effects is no less than this.
+    /// Lower bound of the criterion of a set with further effects, with `worth` independent equations.
     pub(crate) fn least_criterion(
         &self,
         beyond: &ExtensionBound<'_>,
@@ -63,7 +66,7 @@ impl EffectSelector<'_> {
         worth * squares.max(f64::MIN_POSITIVE).ln() + freedoms * worth.ln().max(1.0)
     }
 
-    /// Numbers that are free in an effect at least: those with the wrong sign may be none.
+    /// Least number of estimated values in an effect: parameters with the wrong sign may be set to zero.
     fn fewest_freedoms(&self, pick: &SelectedEffect) -> usize {
         let candidate = self.candidate(pick);
         let has_sign = candidate
@@ -72,6 +75,7 @@ impl EffectSelector<'_> {
             .any(|p| p.sign != SignConstraint::Any);
         let is_body = matches!(candidate.source, ColumnSource::Body(_));
         let may_lose = candidate.refines.is_none() && candidate.searched_constants == 0;
+        // One estimated number is the least that remains.
         if may_lose && (has_sign || is_body) {
             pick.rank.min(1)
         } else {
@@ -81,11 +85,12 @@ impl EffectSelector<'_> {
 }
 
 impl ExtensionBound<'_> {
+    /// Row of the measured forces in the table.
     fn measured_index(&self) -> usize {
         self.table.gram.nrows() - 1
     }
 
-    /// Inner product of two columns of the table once the set is taken off.
+    /// Inner product of two columns of the table with the set projected out.
     fn product(&self, a: usize, b: usize) -> f64 {
         let n = self.halves.nrows();
         let [one, two] = [a, b].map(|k| &self.halves.as_slice()[k * n..(k + 1) * n]);
@@ -93,11 +98,12 @@ impl ExtensionBound<'_> {
         self.table.gram[(a, b)] - known
     }
 
-    /// Squares that the set leaves at least together with further columns.
+    /// Lower bound of the squared residual of the set with further columns, which may take any sign.
     fn least_squares<'k>(&self, columns: impl Iterator<Item = &'k usize>) -> f64 {
         let mut places = [self.measured_index(); MOST + 1];
         let mut n = 0;
         for k in columns {
+            // Too many columns: zero is a valid bound.
             if n == MOST {
                 return 0.0;
             }
@@ -105,14 +111,17 @@ impl ExtensionBound<'_> {
             n += 1;
         }
         places[n] = self.measured_index();
+        // Products of the added columns and the measured forces, with the set projected out.
         let mut left = [[0.0; MOST + 1]; MOST + 1];
         for i in 0..=n {
             for j in 0..=i {
                 left[i][j] = self.product(places[i], places[j]);
             }
         }
+        // Gaussian elimination of the added columns; the last diagonal entry is the squared residual.
         for i in 0..n {
             let own = self.table.gram[(places[i], places[i])];
+            // A dependent column explains nothing more.
             if left[i][i] <= NEGLIGIBLE_SHARE * own {
                 continue;
             }
@@ -174,8 +183,8 @@ mod tests {
         }
     }
 
-    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion, and near
-    /// it where no sign matters.
+    /// What is passed over is worse than the bound that it is passed over for: the bound is never above the criterion,
+    /// and near it where no sign matters.
     #[test]
     fn no_set_is_better_than_its_bound() {
         let value = |i: u32| (0.09 * f64::from(i)).sin() - 0.4 * (0.31 * f64::from(i)).cos();

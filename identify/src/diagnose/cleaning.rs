@@ -1,30 +1,25 @@
-//! What is taken off the measured forces before anything is looked for, since no least squares bears it: single outliers, and
-//! what is periodic in time (`hum`). Both are told by name.
+//! Removes from the measured forces what least squares cannot tolerate: single outliers, and oscillations that are
+//! periodic in time (`hum`). Both are reported by name.
 //!
-//! Both are looked for in what base parameters and friction leave. An outlier stands above its neighbours' median by many
-//! robust deviations, and not where a drive reverses.
+//! Both are searched in the residual of base parameters and friction. An outlier differs from the median of its
+//! neighbours by many robust standard deviations, and is not next to a reversal of the drive.
 
 use super::disturbance::{Disturbance, EstimatedQuantity};
 use super::hum::{self, SlowSpectralLine};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
+use super::thresholds::{
+    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE,
+    QUANTISED_FEWEST_REPEATS, QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART,
+    QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES, REVERSAL_UNDECIDED_SAMPLES,
+    REVERSALS_MOST_SHARE,
+};
 use crate::signal::median;
 
-/// Samples whose median an outlier stands out from.
+/// Number of samples around an outlier whose median it is compared with.
 const NEIGHBOURS: usize = 9;
-/// By how many robust deviations.
-const OUTLIER_DEVIATIONS: f64 = 7.0;
-/// What is less than this part of the force is rounding.
-const ROUNDING_SHARE: f64 = 1e-3;
-/// What happens more often is how the force is.
-const RARE: f64 = 0.05;
-/// Samples about a reversal that are left alone.
-const REVERSAL: usize = 4;
-/// Samples on either side of a reversal that count no more, and the part of all that they may be.
-const JUMP: usize = 1;
-const MOST_JUMPS: f64 = 0.1;
 
-/// Takes outliers and lines off the measured forces and says which there were.
+/// Removes outliers and spectral lines from the measured forces and reports them.
 pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     count_removed_squares(problem, |problem| {
         let mut found = remove_outliers(problem);
@@ -34,8 +29,8 @@ pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     })
 }
 
-/// Takes slow lines off forces that were not cleaned yet, and cleans what they leave: their crests are taken for outliers where
-/// nobody knows of them. Says what there was.
+/// Removes slow spectral lines from forces that have not been cleaned, then cleans the rest, and reports all. In this
+/// order, since the crests of an unknown line would be taken for outliers.
 pub(crate) fn clean_with_slow_lines(
     problem: &mut DiagnosisProblem,
     slow: &[SlowSpectralLine],
@@ -50,11 +45,12 @@ pub(crate) fn clean_with_slow_lines(
     found
 }
 
-/// Counts what `clean` takes off among what was removed.
+/// Adds the mean square of what `clean` removes from each channel to the problem's `removed`.
 fn count_removed_squares(
     problem: &mut DiagnosisProblem,
     clean: impl FnOnce(&mut DiagnosisProblem) -> Vec<Disturbance>,
 ) -> Vec<Disturbance> {
+    // Compare the forces before and after cleaning.
     let before = problem.measured.clone();
     let found = clean(problem);
     let squares = |(old, new): (&Option<Vec<f64>>, &Option<Vec<f64>>)| {
@@ -69,8 +65,9 @@ fn count_removed_squares(
     found
 }
 
-/// What base parameters and friction leave, channels weighed alike.
+/// Residual of base parameters and friction, `[channel][sample]`, with all channels weighted equally.
 fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
+    // Fit base and friction to all samples, except those that decide nothing.
     let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
@@ -80,15 +77,17 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
             .as_ref()
             .map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64)
     };
+    // First weights from the size of the forces.
     let weight = |values: &Option<Vec<f64>>| 1.0 / size(values).max(f64::MIN_POSITIVE);
     let mut weights: Vec<f64> = problem.measured.0.iter().map(weight).collect();
     which.push(measured);
     let mut rest = Vec::new();
+    // Two passes: the second uses weights from the residual of the first.
     for _ in 0..2 {
         let (factors, _) = solve_gram(&pool.gram(&which, &weights, FitScope::All));
         rest = pool.residual(measured, &which[..which.len() - 1], factors.as_slice());
         for (weight, rest) in weights.iter_mut().zip(&rest) {
-            // The middle of squares is none of the outliers'.
+            // The median of the squares is not affected by outliers.
             let middle = median(rest.iter().map(|r| r * r).collect());
             *weight = 1.0 / middle.max(f64::MIN_POSITIVE);
         }
@@ -96,29 +95,36 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
     rest
 }
 
+/// Replaces outliers by the median of their neighbours and reports their share and rms size per channel.
 fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     let mut flagged: Vec<Vec<bool>> =
         vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
+    // Distances of the outliers of each channel, for the report.
     let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); flagged.len()];
+    // Large outliers hide smaller ones, so the search is repeated.
     for _ in 0..3 {
         let rest = base_residual(problem);
         let mut more = false;
         for (d, rest) in rest.iter().enumerate() {
-            let reverses = reversal_samples(problem, d, REVERSAL);
+            let reverses = reversal_samples(problem, d, REVERSAL_OUTLIER_SAMPLES);
+            // Distance from the local median, compared with the noise of the channel.
             let apart = deviation_from_neighbours(problem, rest);
+            // 1.4826 times the median of absolute values is the standard deviation of normal noise.
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
             let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound =
-                (OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(ROUNDING_SHARE * size);
+            let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d]))
+                .max(OUTLIER_LEAST_FORCE_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
-            let is_rare = (new.len() as f64) < RARE * rest.len() as f64;
+            // Frequent large distances belong to the force, for example stick-slip.
+            let is_rare = (new.len() as f64) < OUTLIERS_MOST_SHARE * rest.len() as f64;
             let Some(values) = problem.measured.0[d].as_mut().filter(|_| is_rare) else {
                 continue;
             };
             for i in new {
+                // Move the sample to the median of its neighbours.
                 values[i] -= apart[i];
                 sizes[d].push(apart[i]);
                 flagged[d][i] = true;
@@ -130,6 +136,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
         }
     }
     let channels = flagged.iter().zip(&sizes).enumerate();
+    // Report channels with outliers.
     let told = channels.filter(|(_, (_, sizes))| !sizes.is_empty());
     told.map(|(d, (flagged, sizes))| {
         let count = flagged.iter().filter(|f| **f).count() as f64;
@@ -149,14 +156,16 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
     .collect()
 }
 
-/// Samples about which a channel's drive reverses, where friction jumps.
+/// Whether each sample is within some samples of a reversal of the channel's drive, where friction jumps.
 fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) -> Vec<bool> {
     let n = problem.layout.samples();
     let mut about = vec![false; n];
+    // The second friction column of a drive is the sign of its rate.
     let sign = problem.friction.get(3 * channel + 1);
     let Some(sign) = sign.and_then(|column| column.0[channel].as_ref()) else {
         return about;
     };
+    // The sign of the rate changes or is zero between two samples.
     for i in 1..n {
         if sign[i] * sign[i - 1] <= 0.0 {
             let end = (i + samples).min(n);
@@ -166,13 +175,14 @@ fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) 
     about
 }
 
-/// How far each sample is from the middle of those about it.
+/// Distance of each sample from the median of its neighbours within the segment.
 fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f64> {
     let mut apart = Vec::with_capacity(rest.len());
     let mut start = 0;
     for stretch in &problem.layout.segments {
         let part = &rest[start..start + stretch.samples];
         for i in 0..part.len() {
+            // The window is shifted at the ends of a segment.
             let low = i.saturating_sub(NEIGHBOURS / 2);
             let high = (low + NEIGHBOURS).min(part.len());
             apart.push(part[i] - median(part[low..high].to_vec()));
@@ -182,30 +192,39 @@ fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f6
     apart
 }
 
-/// The step in which a force is read, if all of its values are multiples of one that is coarser than its noise; in its unit.
+/// Step of a quantised force signal, in its unit: the common divisor of its values, if it is coarser than the noise.
+/// `None` otherwise.
 pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
+    // Values that differ by rounding only are equal.
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
-    if sorted.len() < 3 || 4 * sorted.len() > values.len() {
+    // Quantised values repeat; many different values mean a fine resolution.
+    if sorted.len() < QUANTISED_FEWEST_VALUES
+        || QUANTISED_FEWEST_REPEATS * sorted.len() > values.len()
+    {
         return None;
     }
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
+    // The smallest difference is the step, if all others are multiples of it.
     let step = gaps.fold(f64::INFINITY, f64::min);
-    let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < 1e-3;
+    let is_multiple =
+        |gap: f64| (gap / step - (gap / step).round()).abs() < QUANTISED_MOST_OFF_STEP;
     let all = sorted.windows(2).all(|pair| is_multiple(pair[1] - pair[0]));
-    (all && step / 12.0_f64.sqrt() > 0.3 * noise).then_some(step)
+    // A quantisation step q adds an error of standard deviation q / sqrt(12).
+    (all && step / 12.0_f64.sqrt() > QUANTISED_LEAST_NOISE_PART * noise).then_some(step)
 }
 
 impl DiagnosisProblem {
-    /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and on which side of the
-    /// jump a sample lies no derivative of positions tells.
+    /// Finds the samples next to a reversal of their drive, unless these are many: friction jumps there, and no
+    /// derivative of positions shows on which side of the jump a sample lies.
     pub(crate) fn find_reversal_samples(&mut self) {
         let of = |d: usize| {
-            let jumps = reversal_samples(self, d, JUMP);
+            let jumps = reversal_samples(self, d, REVERSAL_UNDECIDED_SAMPLES);
+            // Leave out reversals only if few samples are lost.
             let count = jumps.iter().filter(|jumps| **jumps).count() as f64;
-            if count < MOST_JUMPS * jumps.len() as f64 {
+            if count < REVERSALS_MOST_SHARE * jumps.len() as f64 {
                 jumps
             } else {
                 Vec::new()
@@ -214,7 +233,7 @@ impl DiagnosisProblem {
         self.jumps = (0..self.layout.channels.len()).map(of).collect();
     }
 
-    /// Samples that decide nothing, by channel.
+    /// Samples that decide nothing, `[channel][sample]`: those left out and those next to reversals.
     pub(crate) fn undecided_samples(&self) -> Vec<Vec<bool>> {
         let of = |d: usize| {
             let out = |all: &[Vec<bool>], i: usize| {

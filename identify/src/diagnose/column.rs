@@ -1,15 +1,16 @@
-//! What an effect adds to the forces along all recordings.
+//! Columns: what a parameter adds to the forces along all recordings, per unit of the parameter.
 
 use std::borrow::Cow;
 
-/// Numbers along all recordings, for each channel one for every sample: recordings of the fit first, then those of the
-/// check; `None` for a channel on which the column is zero throughout.
+/// Values along all recordings, `[channel][sample]`: recordings of the fit first, then validation runs. `None` for a
+/// channel on which the column is zero throughout.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceColumn(pub Vec<Option<Vec<f64>>>);
 
 impl ForceColumn {
     /// A column from all of its channels; those that are zero throughout are left out.
     pub fn new(channels: Vec<Vec<f64>>) -> Self {
+        // A channel of zeros needs no memory.
         let sparse = |values: Vec<f64>| values.iter().any(|x| *x != 0.0).then_some(values);
         Self(channels.into_iter().map(sparse).collect())
     }
@@ -19,6 +20,7 @@ impl ForceColumn {
         for (slot, values) in self.0.iter_mut().zip(&other.0) {
             let Some(values) = values else { continue };
             match slot {
+                // A channel that is zero so far takes a copy of the other column.
                 Some(sum) => {
                     for (s, x) in sum.iter_mut().zip(values) {
                         *s += factor * x;
@@ -42,6 +44,7 @@ impl ForceColumn {
         &'a self,
         other: &'a Self,
     ) -> impl Iterator<Item = (usize, &'a [f64], &'a [f64])> {
+        // Channels on which one of both is zero are left out.
         let pairs = self.0.iter().zip(&other.0).enumerate();
         pairs.filter_map(|(d, (a, b))| Some((d, a.as_deref()?, b.as_deref()?)))
     }

@@ -1,20 +1,21 @@
-//! A number of the model that is off, such as a length: forces bend as it moves, by their first and second derivatives.
+//! A constant of the model with a wrong value, such as a length. Its effect on the forces is described by their first
+//! and second derivatives.
 
 use super::column::ForceColumn;
 use super::tilt::ForceSensitivity;
 
-/// A constant of the model whose value may be wrong; its parameter is what it is too small by.
+/// A constant whose value may be wrong; its parameter is the true value minus the value of the model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConstantCorrection {
-    /// What forces change by with it, for each unit.
+    /// First derivative of the forces with respect to it.
     pub first_derivative: ForceSensitivity,
-    /// What that changes by, for each unit.
+    /// Second derivative of the forces with respect to it.
     pub second_derivative: ForceSensitivity,
 }
 
 impl ConstantCorrection {
-    /// What forces change by, for each unit, between no error and one of a size: times the error it is the whole change, up to
-    /// its third power. `base` are the parameters of the base columns.
+    /// Change of the forces per unit of the error, between no error and `error`: times the error it is the complete
+    /// change up to the third power. `base` are the factors of the base columns.
     pub(crate) fn secant_column(&self, error: f64, base: &[f64], channels: usize) -> ForceColumn {
         let mut sum = ForceColumn(vec![None; channels]);
         for (part, share) in [
@@ -37,7 +38,7 @@ impl ConstantCorrection {
 mod tests {
     use super::*;
 
-    /// The square of a number, of which the base column and a held force have one part each.
+    /// The square of a number, of which the base column and the force of a fixed parameter each have a part.
     #[test]
     fn the_column_times_the_error_is_the_change() {
         let one = |value: f64| ForceColumn(vec![Some(vec![value])]);

@@ -1,25 +1,26 @@
-//! What recordings have that no part of the model is: faults of sensors, of the day, of the recording.
+//! Disturbances of recordings, which are no part of the model, and the origin of the residual of each channel.
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::noise::effective_samples;
 use super::pool::dot;
 use super::problem::{CandidateNature, DiagnosisProblem};
+use super::thresholds::{COLOURED_LEAST_VARIANCE_RATIO, COLOURED_MOST_EFFECTIVE_SHARE};
 
-/// A value of a disturbance or an effect.
+/// A named value of a disturbance or an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EstimatedQuantity {
-    /// What it is.
+    /// Name of the quantity.
     pub name: String,
     /// Its value.
     pub value: f64,
     /// Its standard deviation, where it is known.
     pub standard_deviation: Option<f64>,
-    /// Unit of both.
+    /// Unit of both; empty if it is that of the force.
     pub unit: String,
 }
 
 impl EstimatedQuantity {
-    /// A value without a deviation.
+    /// A value without a standard deviation.
     pub fn new(name: &str, value: f64, unit: &str) -> Self {
         Self {
             name: name.to_owned(),
@@ -33,9 +34,9 @@ impl EstimatedQuantity {
 /// A fault of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Disturbance {
-    /// What scripts call it.
+    /// Name of the kind in JSON and in scripts.
     pub kind: String,
-    /// Drives or coordinates that have it.
+    /// Names of the drives or coordinates that have it.
     pub at: Vec<String>,
     /// How large it is.
     pub estimates: Vec<EstimatedQuantity>,
@@ -43,35 +44,30 @@ pub struct Disturbance {
     pub recordings: Vec<String>,
     /// When it acts, s; `None` for all of the time.
     pub interval: Option<[f64; 2]>,
-    /// What it is, in words, where whoever found it has some of its own.
+    /// Description for people, if it was given one.
     pub description: Option<String>,
 }
 
-/// What is left of a force, by where it comes from; effective values in its unit.
+/// Residual of a force by its origin: rms values in the unit of the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResidualBudget {
-    /// Noise, white or coloured: it does not come again.
+    /// Noise, white or coloured: it is not repeatable.
     pub noise: f64,
-    /// What does not repeat with the state: drift, hum, outliers, events, another day.
+    /// Disturbances that are not a function of the state: drift, hum, outliers, events, differences between recordings.
     pub non_repeatable: f64,
-    /// What comes again with the state, and the model does not say.
+    /// Repeatable residual, which the model does not explain.
     pub model: f64,
     /// The measured force itself.
     pub force: f64,
 }
 
-/// Noise of a residual counts as coloured where it is worth fewer samples than this share of them.
-const COLOURED: f64 = 0.5;
-/// And where its variance is so many times that of the white noise.
-const ABOVE_WHITE: f64 = 1.5;
-
-/// Whether noise of a variance is no more than the white noise of its channel.
+/// Whether a variance is not larger than that of the white noise of its channel.
 pub(crate) fn is_white(problem: &DiagnosisProblem, channel: usize, variance: f64) -> bool {
-    variance < ABOVE_WHITE * problem.noise[channel].powi(2)
+    variance < COLOURED_LEAST_VARIANCE_RATIO * problem.noise[channel].powi(2)
 }
 
 impl EffectSelector<'_> {
-    /// Members of a set that are faults of the recordings, with what they are worth.
+    /// Members of a set that are disturbances, with their estimates.
     pub(crate) fn disturbances(&self, picks: &[SelectedEffect]) -> Vec<Disturbance> {
         let fitted = self.estimate_parameters(picks, super::pool::FitScope::All);
         let mut found: Vec<Disturbance> = Vec::new();
@@ -101,7 +97,8 @@ impl EffectSelector<'_> {
         found
     }
 
-    /// Where the noise of each channel comes from, and noise that has a memory by name.
+    /// Splits the residual of each channel by its origin, and reports coloured noise. `rest` is `[channel][sample]`,
+    /// `again` the repeatable share of its squares.
     pub(crate) fn residual_budgets(
         &self,
         picks: &[SelectedEffect],
@@ -114,7 +111,9 @@ impl EffectSelector<'_> {
         let mut budgets = Vec::new();
         let mut coloured = Vec::new();
         for (d, rest) in rest.iter().enumerate() {
+            // Force of all members of the set that are disturbances.
             let mut disturbed = vec![0.0; rest.len()];
+            // Factors of the effects follow those of the base.
             let mut at = self.base.len();
             for pick in picks {
                 for k in &pick.columns {
@@ -128,6 +127,7 @@ impl EffectSelector<'_> {
                     at += 1;
                 }
             }
+            // Split the mean square of the residual into the repeatable part and noise.
             let left = size(rest);
             let model = left * again[d];
             let force = problem.measured_force(d);
@@ -144,18 +144,21 @@ impl EffectSelector<'_> {
         (budgets, coloured)
     }
 
-    /// Noise of a channel whose samples resemble their neighbours, and what comes again with the state is not most of it.
+    /// Coloured noise of a channel: its samples are correlated, and most of it is not repeatable. `None` if the noise
+    /// is white.
     fn coloured_noise(&self, channel: usize, rest: &[f64], again: f64) -> Option<Disturbance> {
         let layout = &self.problem.layout;
         let variance = dot(rest, rest) / rest.len().max(1) as f64;
         if is_white(self.problem, channel, variance * (1.0 - again)) {
             return None;
         }
+        // Share of samples that are independent.
         let worth = effective_samples(rest) / rest.len().max(1) as f64;
-        if worth > COLOURED {
+        if worth > COLOURED_MOST_EFFECTIVE_SHARE {
             return None;
         }
-        // Of a first-order process with that many samples to one that counts.
+        // Coefficient a of a first-order process with (1 + a) / (1 - a) samples per independent one; it gives the
+        // corner frequency.
         let memory = worth.recip();
         let keeps = (memory - 1.0) / (memory + 1.0);
         let step = layout.segments.first().map_or(1.0, |s| s.step);
@@ -175,7 +178,7 @@ impl EffectSelector<'_> {
 }
 
 impl DiagnosisProblem {
-    /// The measured force of a channel, with that of held parameters.
+    /// Measured force of a channel with the forces of fixed parameters added, N or N m.
     pub(crate) fn measured_force(&self, channel: usize) -> Vec<f64> {
         let mut force = self.measured.0[channel]
             .clone()

@@ -1,24 +1,21 @@
-//! Values of a set of effects with their deviations, and how likely each of them is.
+//! Estimates of a set of effects with their standard deviations, and the probability of each effect.
 //!
-//! Decision: odds from the likelihood are astronomic for the best candidate. So a fiftieth is reserved for causes
-//! outside of all candidates, and a quarter where something of the effect's channels stays unexplained. The rest is
-//! shared with the alternatives, by how much worse they are.
+//! Decision: odds from the likelihood are extreme for the best candidate. So a fiftieth is reserved for causes outside
+//! of all candidates, and a quarter where something of the effect's channels stays unexplained. The rest is shared with
+//! the alternatives, by how much worse they are.
 
 use nalgebra::DMatrix;
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::FitScope;
-
-/// Odds beyond which nothing speaks louder, in twice their logarithm.
-const MAX_LOG_ODDS: f64 = 20.0;
-/// How likely it is that the cause of what a found effect explains is another one, which no candidate says: where the rest is
-/// noise, and where some of it comes again unexplained.
-const UNKNOWN_CAUSE_PROBABILITY: f64 = 0.02;
-const UNKNOWN_CAUSE_IF_UNEXPLAINED: f64 = 0.25;
+use super::thresholds::{
+    ESTIMATE_MOST_VARIANCE_RATIO, MAX_LOG_ODDS, UNKNOWN_CAUSE_IF_UNEXPLAINED,
+    UNKNOWN_CAUSE_PROBABILITY,
+};
 
 impl EffectSelector<'_> {
-    /// Values of each member's parameters with their standard deviations; none where others say the same. Rows count as
-    /// many samples as the residual is worth.
+    /// Estimates of each member's parameters with their standard deviations, `[effect][parameter]`; the deviation is
+    /// `None` if other columns explain the same. Each channel counts with its effective number of samples.
     pub(crate) fn estimate_parameters(
         &self,
         picks: &[SelectedEffect],
@@ -33,6 +30,7 @@ impl EffectSelector<'_> {
         }
         let gram = self.pool.gram(&which, &weights, on);
         let n = gram.nrows();
+        // Covariance from the inverse of the scaled normal equations; a tiny ridge keeps dependent columns solvable.
         let scale: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt()).collect();
         let by = |i: usize, j: usize| {
             let size = scale[i] * scale[j];
@@ -50,8 +48,10 @@ impl EffectSelector<'_> {
             let of = |k: usize| {
                 let variance = inverse.as_ref().map_or(f64::NAN, |inverse| inverse[(k, k)]);
                 let deviation = variance.sqrt() / scale[k];
-                // What is not known to a thousandth of what its column could say is no number of its own.
-                let is_known = deviation.is_finite() && variance < 1e9 && factors[k] != 0.0;
+                // An estimate whose uncertainty is far above what its column alone would give is not determined.
+                let is_known = deviation.is_finite()
+                    && variance < ESTIMATE_MOST_VARIANCE_RATIO
+                    && factors[k] != 0.0;
                 (factors[k], is_known.then_some(deviation))
             };
             all.push((at..at + pick.columns.len()).map(of).collect());
@@ -60,9 +60,9 @@ impl EffectSelector<'_> {
         all
     }
 
-    /// How likely it is that a member is there: by the odds against the set without it, shared with what cannot be told from
-    /// it, of which it says how much worse each is. No evidence speaks against causes that nobody has thought of; they are
-    /// likelier where something of its channels stays unexplained.
+    /// Probability that a member is present: from the odds against the set without it, shared with the alternatives,
+    /// whose losses are `rivals`. No evidence excludes unknown causes; they are more probable if a residual on its
+    /// channels is unexplained.
     pub(crate) fn probability(
         &self,
         picks: &[SelectedEffect],
@@ -74,6 +74,7 @@ impl EffectSelector<'_> {
         let pick = without.remove(member);
         let channels = self.affected_channels(&[pick]);
         let evidence = self.evidence(&without, picks, &channels);
+        // The criterion is twice the logarithm of the odds.
         let for_it = (0.5 * evidence.bic.clamp(-MAX_LOG_ODDS, MAX_LOG_ODDS)).exp();
         let others = rivals.iter().map(|worse| (-0.5 * worse).exp());
         let share = 1.0 / (1.0 + others.sum::<f64>());

@@ -1,8 +1,9 @@
-//! What is periodic in time: lines of the spectrum, as the hum of the mains.
+//! Oscillations that are periodic in time, such as mains hum: spectral lines of the residual.
 //!
-//! A line stands above the spectrum about it, beyond the frequencies of the motion; its frequency is where least squares of a
-//! sine and a cosine explains most. A slow one, among the frequencies of the motion, is seen once all that follows the state is
-//! taken off: it is most of what is left then, with one frequency in every stretch, and one phase from its begin to its end.
+//! A line is higher than the spectrum around it, beyond the frequencies of the motion. Its frequency is where a least
+//! squares fit of a sine and a cosine explains most. A slow line, among the frequencies of the motion, is visible after
+//! everything that is a function of the state has been subtracted: then it is most of the residual, with one frequency
+//! in every segment and one phase from its begin to its end.
 
 use std::f64::consts::TAU;
 
@@ -10,39 +11,30 @@ use super::column::ForceColumn;
 use super::disturbance::{Disturbance, EstimatedQuantity, is_white};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
+use super::thresholds::{
+    LINE_LOW_HZ, LINE_LOWEST_HZ, LINE_MAIN_SHARE, MIN_LINE_RATIO, MIN_LINE_SHARE, MOST_LINES,
+    SLOW_LINE_LEAST_PERIODS, SLOW_LINE_LEAST_SEGMENT_SHARE, SLOW_LINE_MOST_REMAINING_SHARE,
+    SLOW_LINE_PARTS,
+};
 use crate::signal::{hann_power, median};
 
-/// How many times the middle of the spectrum about it a line must reach.
-const MIN_LINE_RATIO: f64 = 60.0;
-/// Half the width of what counts as about it, and of the line itself, in steps of the spectrum.
+/// Half width of the neighbourhood of a line, and of the line itself, in steps of the spectrum.
 const NEIGHBOURHOOD: usize = 48;
 const LINE: usize = 6;
-/// Lines below this frequency, Hz, may be those of the motion; so may those of which there are many. Below the second they
-/// must be most of what is left of a channel.
-const LOWEST: f64 = 3.0;
-const LOW: f64 = 8.0;
-const MIN_RESIDUAL_SHARE: f64 = 0.6;
-const MOST_LINES: usize = 6;
-/// The part of a channel's squared rest that all of its lines must be.
-const MIN_LINE_SHARE: f64 = 0.02;
-/// Turns that a slow line makes in every stretch.
-const TURNS: f64 = 4.0;
-/// Parts of every stretch of which it must be most with the same amplitude and phase.
-const PARTS: usize = 4;
-/// The part of what no function of the state explains that it may leave, where the state explains some.
-const MAX_REMAINING_SHARE: f64 = 0.5;
-/// The part of every stretch that it must be for its frequency to be sought, and how many times that is narrowed.
-const MIN_SEGMENT_SHARE: f64 = 0.3;
+/// Number of refinements of the frequency of a slow line.
 const NARROWED: usize = 10;
 
-/// Lines of the spectrum, taken off with a phase of their own in every stretch.
+/// Removes spectral lines from the measured forces, with their own phase in every segment, and reports them. `rest` is
+/// the residual, `[channel][sample]`.
 pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
     let channels = rest.len();
     let unfit = excluded_samples(problem);
     let mut left = rest.to_vec();
     let mut frequencies: Vec<f64> = Vec::new();
-    let mut lowest = LOWEST;
+    // Subtract one line after the other, the most prominent first.
+    let mut lowest = LINE_LOWEST_HZ;
     while frequencies.len() <= MOST_LINES {
+        // The most prominent line of all channels.
         let Some(frequency) = (0..channels)
             .filter_map(|d| most_prominent_line(problem, &left[d], lowest))
             .max_by(|a, b| a.0.total_cmp(&b.0))
@@ -51,8 +43,10 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
             break;
         };
         let frequency = refine_frequency(problem, &left, &unfit, frequency);
+        // Subtract it from the residual of every channel.
         let mut without = left.clone();
         for (d, left) in without.iter_mut().enumerate() {
+            // Samples that were not measured stay as they are.
             let lost = problem
                 .layout
                 .left_out
@@ -60,21 +54,25 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
                 .map_or(&[][..], Vec::as_slice);
             subtract_sinusoid(problem, left, &unfit[d], lost, frequency);
         }
+        // Whether the line is most of the residual of a channel.
         let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
-            dot(after, after) < (1.0 - MIN_RESIDUAL_SHARE) * dot(before, before)
+            dot(after, after) < (1.0 - LINE_MAIN_SHARE) * dot(before, before)
         };
-        if frequency < LOW && !left.iter().zip(&without).any(is_most) {
-            lowest = LOW;
+        // A line at a low frequency that is not most of a residual comes from the motion; look above that range only.
+        if frequency < LINE_LOW_HZ && !left.iter().zip(&without).any(is_most) {
+            lowest = LINE_LOW_HZ;
             continue;
         }
         left = without;
         frequencies.push(frequency);
     }
+    // Many lines are a periodic motion and no hum.
     if frequencies.is_empty() || frequencies.len() > MOST_LINES {
         return Vec::new();
     }
     let mut found = Vec::new();
     for d in 0..channels {
+        // Only channels on which the lines matter are changed.
         let taken: Vec<f64> = rest[d].iter().zip(&left[d]).map(|(a, b)| a - b).collect();
         if dot(&taken, &taken) > MIN_LINE_SHARE * dot(&rest[d], &rest[d]) {
             found.extend(remove_and_report(problem, d, &taken, &frequencies));
@@ -83,25 +81,26 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
     found
 }
 
-/// A slow line that one channel has.
+/// A slow spectral line in one channel.
 pub(crate) struct SlowSpectralLine {
+    /// Index of the channel.
     channel: usize,
-    /// Hz
+    /// Frequency, Hz.
     frequency: f64,
-    /// Its force, sample by sample.
+    /// Its force at every sample, N or N m.
     force: Vec<f64>,
 }
 
 impl SlowSpectralLine {
-    /// Takes it off the measured force of its channel and says so.
+    /// Subtracts it from the measured force of its channel and reports it; `None` if the channel has no force.
     pub(crate) fn remove_from_force(&self, problem: &mut DiagnosisProblem) -> Option<Disturbance> {
         remove_and_report(problem, self.channel, &self.force, &[self.frequency])
     }
 }
 
-/// Slow lines in what a diagnosis leaves of the channels, `[channel][sample]`; `again` is the share of its squares that comes again
-/// with the state. Where that is more than noise, a line must explain more than all that the state may: what comes again after a
-/// period of the motion comes with the state, and a hum may come again nearly, too.
+/// Slow lines in the residual of a diagnosis, `[channel][sample]`; `again` is the repeatable share of each channel's
+/// squares. Where that is more than noise, a line must explain more than a function of the state can: a residual that
+/// repeats with the period of the motion is a function of the state, and hum may be nearly so.
 pub(crate) fn slow_lines(
     problem: &DiagnosisProblem,
     rest: &[Vec<f64>],
@@ -111,7 +110,9 @@ pub(crate) fn slow_lines(
     let unfit = excluded_samples(problem);
     let mut found = Vec::new();
     for (channel, own) in rest.iter().enumerate() {
+        // Squares that are not a function of the state.
         let by_no_state = dot(own, own) * (1.0 - again[channel]);
+        // White noise contains no line.
         if is_white(problem, channel, by_no_state / own.len().max(1) as f64) {
             continue;
         }
@@ -130,7 +131,10 @@ pub(crate) fn slow_lines(
         else {
             continue;
         };
-        let explains_more = dot(&wave.residual, &wave.residual) < MAX_REMAINING_SHARE * by_no_state;
+        // In a channel with unexplained repeatable residual, a line must leave less than half of the non-repeatable
+        // part.
+        let explains_more =
+            dot(&wave.residual, &wave.residual) < SLOW_LINE_MOST_REMAINING_SHARE * by_no_state;
         if explains_more || !unexplained.contains(&channel) {
             found.push(SlowSpectralLine {
                 channel,
@@ -142,26 +146,30 @@ pub(crate) fn slow_lines(
     found
 }
 
-/// A channel whose rest is asked for one wave, with an amplitude and a phase in every stretch, beside the base and friction.
+/// Fits one sinusoid to the residual of a channel, with its own amplitude and phase in every segment, together with
+/// base and friction.
 struct SinusoidFitter<'a> {
+    /// Segments, base columns and friction.
     problem: &'a DiagnosisProblem,
     channel: usize,
-    /// What is left of the channel without a wave.
+    /// Residual of the channel without a sinusoid.
     residual: &'a [f64],
     pool: ColumnPool<'a>,
-    /// Base and friction.
+    /// Pool columns of base and friction.
     base_columns: Vec<usize>,
-    /// What is left of all channels.
+    /// Pool column of the residual of all channels.
     target: usize,
+    /// Weight of each channel: one over the mean square of its residual.
     weights: Vec<f64>,
 }
 
-/// A wave of some frequency beside the model.
+/// A fitted sinusoid.
 struct SinusoidFit {
+    /// Its force at every sample of the channel, N or N m.
     explained: Vec<f64>,
-    /// What it leaves of its channel.
+    /// Residual of its channel.
     residual: Vec<f64>,
-    /// What it leaves of all channels: squares, each weighed by those before.
+    /// Squared residual of all channels, each relative to that without the sinusoid.
     squares: f64,
 }
 
@@ -172,9 +180,10 @@ impl<'a> SinusoidFitter<'a> {
         let columns = problem.base.iter().chain(&problem.friction);
         let known = columns.map(|c| pool.add(c)).collect();
         let target = pool.add(ForceColumn(rest.iter().cloned().map(Some).collect()));
+        // Channels are weighted by their residual before the fit.
         let weight = |rest: &Vec<f64>| {
             let squares = dot(rest, rest) / rest.len().max(1) as f64;
-            // A channel of which nothing is left says nothing of the noise of others.
+            // A channel without residual gets no weight, since it contains no information on the noise of others.
             if squares > 0.0 { 1.0 / squares } else { 0.0 }
         };
         Self {
@@ -188,11 +197,13 @@ impl<'a> SinusoidFitter<'a> {
         }
     }
 
+    /// Fits a sinusoid of one frequency, Hz.
     fn fit_sinusoid(&mut self, frequency: f64) -> SinusoidFit {
         let layout = &self.problem.layout;
         let mut which = self.base_columns.clone();
         let mut start = 0;
         for stretch in &layout.segments {
+            // A sine and a cosine in every segment.
             for shift in [0.0, 0.25] {
                 let mut wave = vec![0.0; layout.samples()];
                 for (i, x) in wave[start..start + stretch.samples].iter_mut().enumerate() {
@@ -208,8 +219,10 @@ impl<'a> SinusoidFitter<'a> {
         let (factors, _) = solve_gram(&self.pool.gram(&which, &self.weights, FitScope::All));
         which.pop();
         let mut left = self.pool.residual(self.target, &which, factors.as_slice());
+        // Squared residual relative to that before the fit, summed over the channels.
         let weighed = left.iter().zip(&self.weights);
         let squares = weighed.map(|(left, weight)| weight * dot(left, left)).sum();
+        // Force of the sinusoid: its columns times their factors.
         let mut taken = vec![0.0; layout.samples()];
         let waves = self.pool.split_off(self.target + 1);
         for (wave, factor) in waves
@@ -227,7 +240,8 @@ impl<'a> SinusoidFitter<'a> {
         }
     }
 
-    /// The part of what is left of the channel that a wave takes, in the part of a stretch or a whole one of which it takes least.
+    /// Share of the channel's squared residual that a sinusoid explains, in the part of a segment in which it explains
+    /// least. Each segment is divided into `parts`.
     fn least_explained_share(&self, wave: &SinusoidFit, parts: usize) -> f64 {
         let mut start = 0;
         let mut least: Option<f64> = None;
@@ -236,6 +250,7 @@ impl<'a> SinusoidFitter<'a> {
                 let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / parts);
                 let [before, after] =
                     [self.residual, &wave.residual].map(|r| dot(&r[from..to], &r[from..to]));
+                // Share of the squares that the sinusoid explains in this part.
                 if before > 0.0 {
                     let taken = 1.0 - after / before;
                     least = Some(least.map_or(taken, |least| least.min(taken)));
@@ -246,18 +261,24 @@ impl<'a> SinusoidFitter<'a> {
         least.unwrap_or(0.0)
     }
 
-    /// The frequency, about one that is nearly right, at which least is left, and its wave; `None` unless that is most of what is
-    /// left of the channel in every part of every stretch. What swings by itself has no such phase.
+    /// The frequency, Hz, near `about` with the smallest residual, and its sinusoid. `None` unless it explains most of
+    /// the residual in every part of every segment: a resonance has no such constant phase.
     fn find_sinusoid(&mut self, about: f64) -> Option<(f64, SinusoidFit)> {
         let lasts = self.problem.layout.segments.iter();
         let lasts: Vec<f64> = lasts.map(|s| s.samples as f64 * s.step).collect();
-        if lasts.iter().any(|lasts| lasts * about < TURNS) {
+        // Fewer periods than this could be a motion or a drift.
+        if lasts
+            .iter()
+            .any(|lasts| lasts * about < SLOW_LINE_LEAST_PERIODS)
+        {
             return None;
         }
+        // The starting frequency must already explain a part of every segment.
         let mut best = (about, self.fit_sinusoid(about));
-        if self.least_explained_share(&best.1, 1) < MIN_SEGMENT_SHARE {
+        if self.least_explained_share(&best.1, 1) < SLOW_LINE_LEAST_SEGMENT_SHARE {
             return None;
         }
+        // Narrow the frequency, starting below the resolution of the longest segment.
         let mut step = 0.4 / lasts.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
         for _ in 0..NARROWED {
             for frequency in [best.0 - step, best.0 + step] {
@@ -268,14 +289,16 @@ impl<'a> SinusoidFitter<'a> {
             }
             step *= 0.6;
         }
-        (self.least_explained_share(&best.1, PARTS) >= MIN_RESIDUAL_SHARE).then_some(best)
+        (self.least_explained_share(&best.1, SLOW_LINE_PARTS) >= LINE_MAIN_SHARE).then_some(best)
     }
 }
 
-/// Samples that tell no wave, by channel: such as were not measured, and such as decide nothing.
+/// Samples that are not used to find lines, `[channel][sample]`: those that were not measured and those that decide
+/// nothing.
 fn excluded_samples(problem: &DiagnosisProblem) -> Vec<Vec<bool>> {
     let mut unfit = problem.undecided_samples();
     for (unfit, lost) in unfit.iter_mut().zip(&problem.layout.left_out) {
+        // Samples that were not measured have no residual.
         for (unfit, lost) in unfit.iter_mut().zip(lost) {
             *unfit |= lost;
         }
@@ -283,7 +306,7 @@ fn excluded_samples(problem: &DiagnosisProblem) -> Vec<Vec<bool>> {
     unfit
 }
 
-/// Takes lines off the measured force of a channel and says which.
+/// Subtracts lines from the measured force of a channel and reports amplitude and frequencies.
 fn remove_and_report(
     problem: &mut DiagnosisProblem,
     channel: usize,
@@ -297,7 +320,9 @@ fn remove_and_report(
             *value -= taken;
         }
     }
+    // Samples at which the lines were subtracted.
     let acts = taken.iter().filter(|x| **x != 0.0).count();
+    // A sine of amplitude A has the mean square A^2 / 2.
     let amplitude = (2.0 * dot(taken, taken) / acts.max(1) as f64).sqrt();
     let mut estimates = vec![EstimatedQuantity::new("amplitude", amplitude, "")];
     let each = frequencies.iter();
@@ -312,7 +337,7 @@ fn remove_and_report(
     })
 }
 
-/// The frequency of the highest peak in the longest stretch, Hz.
+/// The frequency of the highest peak in the spectrum of the longest segment, Hz.
 fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> {
     let mut start = 0;
     let mut longest: Option<(f64, &[f64], f64)> = None;
@@ -325,12 +350,14 @@ fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> 
         }
     }
     let (_, part, step) = longest?;
+    // Power spectrum with a Hann window; index times the frequency step is the frequency.
     let power = hann_power(part);
     let highest = (1..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b]))?;
     Some(highest as f64 * 0.5 / step / (power.len() - 1) as f64)
 }
 
-/// The line that stands out most from the spectrum about it: by how much, and its frequency, Hz.
+/// The most prominent line of a series above a frequency `lowest`, Hz: its ratio to the spectrum around it, and its
+/// frequency, Hz. `None` if none is above the least ratio.
 fn most_prominent_line(
     problem: &DiagnosisProblem,
     rest: &[f64],
@@ -341,6 +368,7 @@ fn most_prominent_line(
     for stretch in &problem.layout.segments {
         let power = hann_power(&rest[start..start + stretch.samples]);
         start += stretch.samples;
+        // A short segment has too few frequencies for a neighbourhood.
         if power.len() < 4 * NEIGHBOURHOOD {
             continue;
         }
@@ -355,6 +383,7 @@ fn most_prominent_line(
             let about = (k.saturating_sub(NEIGHBOURHOOD)..(k + NEIGHBOURHOOD + 1).min(power.len()))
                 .filter(|i| i.abs_diff(k) > LINE)
                 .map(|i| power[i]);
+            // The median of the neighbourhood is not affected by other lines.
             let level = median(about.collect());
             let above = power[k] / level.max(f64::MIN_POSITIVE);
             if level > 0.0 && above > MIN_LINE_RATIO && best.is_none_or(|(most, _)| above > most) {
@@ -365,7 +394,7 @@ fn most_prominent_line(
     best
 }
 
-/// The frequency about which a sine and a cosine explain most of all channels.
+/// The frequency, Hz, near `about` at which a sine and a cosine explain most of all channels.
 fn refine_frequency(
     problem: &DiagnosisProblem,
     rest: &[Vec<f64>],
@@ -374,7 +403,9 @@ fn refine_frequency(
 ) -> f64 {
     let longest = problem.layout.segments.iter();
     let longest = longest.map(|s| s.samples as f64 * s.step);
+    // Frequency resolution of the longest segment.
     let width = 1.0 / longest.fold(f64::MIN_POSITIVE, f64::max);
+    // Squares that a sinusoid explains in all channels together.
     let explained = |frequency: f64| -> f64 {
         let all = rest.iter().zip(unfit).map(|(rest, unfit)| {
             let mut left = rest.clone();
@@ -384,6 +415,7 @@ fn refine_frequency(
         all.sum()
     };
     let (mut centre, mut step) = (about, 0.5 * width);
+    // Pattern search: move to the best of three frequencies and reduce the step.
     for _ in 0..12 {
         let tried = [centre - step, centre, centre + step].map(|f| (explained(f), f));
         let best = tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
@@ -393,7 +425,8 @@ fn refine_frequency(
     centre
 }
 
-/// Takes the best sine and cosine off a series, stretch by stretch: fitted without what is `unfit`, taken off all that is not `spared`.
+/// Subtracts the best sine and cosine from a series, segment by segment. They are fitted without the samples in
+/// `unfit`, and subtracted from all samples that are not `spared`.
 fn subtract_sinusoid(
     problem: &DiagnosisProblem,
     rest: &mut [f64],
@@ -405,6 +438,7 @@ fn subtract_sinusoid(
     for stretch in &problem.layout.segments {
         let part = &mut rest[start..start + stretch.samples];
         let is_out = |out: &[bool], i: usize| out.get(start + i) == Some(&true);
+        // Sine and cosine at the samples of the segment.
         let waves: Vec<(f64, f64)> = (0..part.len())
             .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
             .collect();
@@ -415,6 +449,7 @@ fn subtract_sinusoid(
                 *sum += x;
             }
         }
+        // Normal equations of two unknowns.
         let [ss, sc, cc, sr, cr] = sums;
         let determinant = ss * cc - sc * sc;
         if determinant > 1e-9 * ss * cc {
@@ -435,7 +470,7 @@ mod tests {
     use crate::diagnose::problem::{SampleLayout, SampleSegment};
     use crate::test_noise::TestNoise;
 
-    /// Two stretches of 300 samples at 44 Hz, with what is left of a force.
+    /// Two segments of 300 samples at 44 Hz, with the residual of a force.
     fn problem(rest: &[f64]) -> DiagnosisProblem {
         let stretch = |name: &str, is_check: bool| SampleSegment {
             name: name.into(),
@@ -485,7 +520,7 @@ mod tests {
         }
     }
 
-    /// What comes again with the state may be a hum too, if that explains more than any state can.
+    /// A repeatable residual may be a hum too, if the hum explains more than any function of the state.
     #[test]
     fn a_hum_that_nearly_comes_again_is_told_and_a_law_is_not() {
         let mut noise = TestNoise::new(3);
@@ -545,7 +580,7 @@ mod tests {
         }
     }
 
-    /// A third of a stretch was not measured, and a column of the base has nearly the frequency of the hum.
+    /// A third of a segment was not measured, and a column of the base has nearly the frequency of the hum.
     #[test]
     fn a_hum_is_told_by_its_size_beside_the_model_and_lost_samples() {
         let mut noise = TestNoise::new(4);

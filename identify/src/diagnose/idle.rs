@@ -1,26 +1,29 @@
-//! Channels of which no force is read, since nothing drives there: their equation of motion holds with a force of zero. Nothing
-//! can be wrong with a reading that there is not, and their noise is that of the states, which shows in what a fit leaves.
+//! Idle channels, which have no force signal since nothing drives there: their equation of motion has the force zero.
+//! They have no sensor faults, and their noise is that of the states, which appears in the residual of a fit. Input:
+//! the problem; output: the noise of its idle channels.
 
 use super::bench::EffectSelector;
-use super::noise::{ROUNDING, white_noise};
+use super::noise::white_noise;
 use super::pool::{FitScope, dot};
 use super::problem::{DiagnosisProblem, NoColumnProvider};
+use super::thresholds::FORCE_ROUNDING;
 
 impl DiagnosisProblem {
-    /// Whether no force of a channel is read.
+    /// Whether a channel has no force signal.
     pub(crate) fn is_idle(&self, channel: usize) -> bool {
         self.idle.get(channel).is_some_and(|idle| *idle)
     }
 
-    /// Gives idle channels their noise.
+    /// Estimates the noise of idle channels.
     ///
-    /// Of zeros alone everything follows if all parameters are zero. So the parameters are those of the channels that are
-    /// read; by the size of what these say of an idle channel its rows are weighed in a second fit, which leaves its noise.
+    /// With zero forces alone, zero parameters would fit. So the parameters are first estimated from the channels with
+    /// a signal. They give the size of the forces of an idle channel, by which its rows are weighted in a second fit;
+    /// the residual of that fit is the noise.
     pub(crate) fn estimate_idle_noise(&mut self) {
         if !self.idle.contains(&true) {
             return;
         }
-        // Candidates take no part in it.
+        // The model is fitted without candidates.
         let candidates = std::mem::take(&mut self.candidates);
         let found = EffectSelector::new(self, &NoColumnProvider).idle_channel_noise();
         self.candidates = candidates;
@@ -31,6 +34,7 @@ impl DiagnosisProblem {
 }
 
 impl EffectSelector<'_> {
+    /// Standard deviation of the noise of each idle channel, as (channel, noise in N or N m).
     fn idle_channel_noise(&mut self) -> Vec<(usize, f64)> {
         let problem = self.problem;
         let channels = 0..problem.layout.channels.len();
@@ -45,8 +49,10 @@ impl EffectSelector<'_> {
                 }
             })
             .collect();
+        // First fit: only channels with a force signal have weight.
         let (factors, _) = self.fit(&[], FitScope::All);
         let idle: Vec<usize> = channels.filter(|d| problem.is_idle(*d)).collect();
+        // Size of the terms that cancel in an idle channel: mean squares of the columns times their factors.
         let mut sizes = Vec::new();
         for d in &idle {
             let terms = self.base.iter().zip(factors.iter()).map(|(k, factor)| {
@@ -58,10 +64,12 @@ impl EffectSelector<'_> {
         for (d, size) in idle.iter().zip(&sizes) {
             self.weights[*d] = over(*size);
         }
+        // Second fit: all channels, idle ones weighted by that size.
         let (factors, _) = self.fit(&[], FitScope::All);
         let rest = self.residual(&[], &factors);
+        // The noise is not below rounding.
         let noise = |(d, size): (&usize, &f64)| {
-            let rounding = ROUNDING * size.max(mean(&rest[*d])).sqrt();
+            let rounding = FORCE_ROUNDING * size.max(mean(&rest[*d])).sqrt();
             (*d, white_noise(&rest[*d]).max(rounding))
         };
         idle.iter().zip(&sizes).map(noise).collect()

@@ -1,21 +1,26 @@
-//! Which effect is missing: columns of what a model could lack go in; the smallest set that explains what it cannot say
-//! comes out, with what cannot be told apart, and an honest answer where nothing explains it.
+//! Which effect is missing. Input: measured forces, columns of the model and columns of candidates. Output: the
+//! smallest set of effects that explains the residual, with indistinguishable alternatives, or the statement that no
+//! candidate explains it.
 //!
-//! 1. [`Problem`] - measured forces, columns of the model, candidates with the constants that are searched for.
-//! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in microseconds;
-//!    `tuning` finds constants, `following` makes columns that depend on the fit, `readings` those of forces that are read
-//!    wrongly, `tilt` turns gravity, `body` places a further mass, `constant` moves a number of the model.
-//! 3. `search` - forward over sets, with exchanges; `evidence` decides on time that was not fitted; `settle` makes the last
-//!    set as small and simple as it can be.
-//! 4. `aliases` - what this recording cannot tell apart; `reproducible` - what no candidate explains and no noise is.
-//! 5. [`Diagnosis`] - the answer.
+//! 1. [`DiagnosisProblem`] - measured forces, columns of the model, candidates with the constants that are searched
+//!    for.
+//! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in
+//!    microseconds; `tuning` finds constants, `following` computes columns that depend on the fit, `readings` those of
+//!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
+//!    the model.
+//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `settle`
+//!    makes the last set as small and simple as possible.
+//! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
+//!    candidate explains.
+//! 5. [`ModelDiagnosis`] - the answer.
 //!
-//! What recordings have and the model does not lack is told by name too: `cleaning` takes outliers and `hum` off beforehand,
-//! `drifts` and `readings` are candidates among the others, and `disturbance` says what is left, and of which sort.
+//! Disturbances of the recordings are reported by name too: `cleaning` removes outliers and `hum` beforehand, `drifts`
+//! and `readings` are candidates among the others, and `disturbance` splits the residual by its origin.
 //!
-//! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles
-//! some effect at any size, so they are candidates like all others, and only effects make the verdict. What least
-//! squares cannot bear (outliers, hum) or what one recording alone has (a push, another day) is removed beforehand.
+//! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles some
+//! effect at any size, so they are candidates like all others, and only effects decide the verdict. Disturbances that
+//! least squares cannot tolerate (outliers, hum) or that only one recording has (a push, another day) are removed
+//! beforehand.
 //!
 //! Decision: samples at reversals decide nothing. Dry friction jumps there, and no derivative of positions shows on
 //! which side of the jump a sample lies. They count in the figures.
@@ -45,6 +50,7 @@ mod readings;
 mod reproducible;
 mod search;
 mod settle;
+mod thresholds;
 mod tile;
 mod tilt;
 mod tuning;
@@ -62,127 +68,136 @@ pub use evidence::SelectionEvidence;
 pub use laws::{
     LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw,
 };
-pub use noise::{ROUNDING, effective_samples, white_noise};
+pub use noise::{effective_samples, white_noise};
 pub use problem::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem,
     EffectParameter, ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider,
     ReadingFaultKind, SampleLayout, SampleSegment, SignConstraint,
 };
 pub use readings::reading_fault_candidates;
+pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
 use bench::{EffectSelector, SelectedEffect};
-use evidence::LEAST_GAIN;
 use pool::{FitScope, dot};
 use reproducible::repeatable_shares;
+use thresholds::{EFFECT_LEAST_UNEXPLAINED_RATIO, LEAST_GAIN, REPLACING_LAW_LEAST_SHARE};
 
 /// Kinds of friction of which a drift is a change.
 const FRICTION: [&str; 2] = ["viscous_friction", "coulomb_friction"];
 
-/// A law for so much of what is left says what effects that it makes needless were part of.
-const MIN_LAW_SHARE: f64 = 0.5;
+/// Reason for rejecting an effect whose estimate has a sign that is physically impossible. Reasons are values of the
+/// JSON, which stay; printers spell them out.
+const WRONG_SIGN: &str = "sign";
 
-/// Why an effect is refused that does nothing but take back another.
+/// Reason for rejecting an effect that is less useful than another one.
+const EXPLAINED_BETTER: &str = "another explains more";
+
+/// Reason for rejecting an effect that only cancels another one.
 const CANCELS: &str = "it would only cancel another effect at its place";
 
-/// The answer.
+/// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DiagnosisVerdict {
-    /// What the model leaves is noise as far as the recordings can tell.
+    /// The residual of the model is noise as far as the recordings can show.
     Adequate,
     /// Effects are missing, and with them the model is adequate.
     MissingEffect,
-    /// What is left comes again, and no candidate explains it.
+    /// A repeatable part of the residual remains that no candidate explains.
     Unexplained,
 }
 
-/// A step of the ladder.
+/// A step of the search: the change of the set of effects and the error after it.
 #[derive(Clone, Debug)]
 pub struct SelectionStep {
-    /// What was added; `None` for the model as it is.
+    /// Effects that were added; empty for the first step, the model as it is.
     pub added: Vec<LocatedEffect>,
-    /// What it replaced.
+    /// Effects that were removed in exchange.
     pub dropped: Vec<LocatedEffect>,
-    /// Relative error on the recordings of the fit.
+    /// Error on the recordings of the fit, relative to the measured force (0.1 = 10 %).
     pub fit: f64,
-    /// The same on those of the check, or of cross-validation if there are none.
+    /// The same on the validation runs, or by cross-validation if there are none.
     pub check: f64,
-    /// As `check`, of each channel beside its own force.
+    /// As `check`, for each channel relative to its own force, `[channel]`.
     pub check_by_channel: Vec<f64>,
-    /// What spoke for it.
+    /// Evidence that supports the step; `None` where a smaller set replaces a larger one.
     pub evidence: Option<SelectionEvidence>,
 }
 
 /// An effect that is missing.
 #[derive(Clone, Debug)]
 pub struct IdentifiedEffect {
-    /// What and where.
+    /// Kind and place.
     pub effect: LocatedEffect,
-    /// Position in [`Problem::candidates`].
+    /// Index into [`DiagnosisProblem::candidates`].
     pub candidate: usize,
-    /// Constants that were searched for.
+    /// Constants that were searched for, as (symbol, value).
     pub constants: Vec<(String, f64)>,
-    /// Estimates of the parameters, from the recordings of the fit.
+    /// Estimates of the parameters from the recordings of the fit, in the order and units of the candidate's
+    /// parameters.
     pub estimates: Vec<f64>,
-    /// Their standard deviations, where they are known.
+    /// Their standard deviations, in the same units; `None` where other columns explain the same.
     pub standard_deviations: Vec<Option<f64>>,
-    /// How likely it is that it is there.
+    /// Probability that the effect is present, 0 to 1.
     pub probability: f64,
-    /// What cannot be told from it.
+    /// Effects that explain the data equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
 }
 
-/// What became of a candidate.
+/// A candidate with the result of the search.
 #[derive(Clone, Debug)]
 pub struct CandidateOutcome {
-    /// What and where.
+    /// Kind and place.
     pub effect: LocatedEffect,
-    /// Share of the squared error of the model as it is that it explains alone.
+    /// Share of the squared error of the unchanged model that it explains alone, 0 to 1.
     pub explained: f64,
-    /// Held-out gain beside the effects that were found; for a found one, what is lost without it.
+    /// Gain in addition to the effects found, on data that was not fitted where it was tested there; for an effect that
+    /// was found, the loss without it.
     pub gain: f64,
-    /// Why it was refused; `None` if it was not.
+    /// Why it was rejected, in words; `None` if it was found.
     pub rejection_reason: Option<String>,
 }
 
-/// What a diagnosis says.
+/// Result of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct ModelDiagnosis {
-    /// The answer.
+    /// The verdict.
     pub verdict: DiagnosisVerdict,
-    /// Noise of all channels relative to the measured forces, white or coloured.
+    /// Noise of all channels, white or coloured, relative to the measured forces (0.01 = 1 %).
     pub noise_floor: f64,
-    /// What is left of each channel, by where it comes from.
+    /// Residual of each channel, split by its origin.
     pub budgets: Vec<ResidualBudget>,
-    /// What the recordings have and the model does not lack.
+    /// Disturbances of the recordings, which are not model errors.
     pub disturbances: Vec<Disturbance>,
-    /// The ladder, from the model as it is.
+    /// Steps of the search; the first is the model as it is.
     pub steps: Vec<SelectionStep>,
     /// Effects that are missing.
     pub effects: Vec<IdentifiedEffect>,
-    /// All candidates, those that explain most first.
+    /// All candidates: first those that were found, then by the share that they explain alone.
     pub candidates: Vec<CandidateOutcome>,
-    /// What the recordings leave open: effects as large as a drive's force would hide in what the model has.
+    /// Effects that the recordings cannot decide: a force as large as the drive's own would be absorbed by columns of
+    /// the model.
     pub undetermined_effects: Vec<LocatedEffect>,
-    /// What is left in the end, `[channel][sample]`.
+    /// Residual of the last set, `[channel][sample]`, N or N m.
     pub residual: Vec<Vec<f64>>,
-    /// Share of each channel's squared rest that comes again where it was not fitted.
+    /// Share of each channel's squared residual that is repeatable on data that was not fitted, 0 to 1.
     pub repeatable_share: Vec<f64>,
-    /// Channels whose rest is unexplained.
+    /// Indices of the channels whose residual is unexplained.
     pub unexplained: Vec<usize>,
-    /// Places on which laws may act, where something is unexplained.
+    /// Places on which proposed laws may act; empty unless something is unexplained.
     pub sites: Vec<LawSite>,
-    /// Laws that no library holds and that would explain it.
+    /// Proposed laws that are in no library and would explain the unexplained residual.
     pub laws: Vec<LawProposal>,
 }
 
-/// Finds what is missing. `supply` makes columns that are not known from the start. Outliers and hum are taken off the measured
-/// forces of the problem, and what is to be left out becomes zero.
+/// Finds the missing effects. `supply` computes columns that are not known from the start. Outliers and hum are
+/// subtracted from the measured forces of the problem, and samples to be left out become zero.
 pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> ModelDiagnosis {
     problem.removed.resize(problem.layout.channels.len(), 0.0);
     problem.find_reversal_samples();
     problem.estimate_idle_noise();
+    // The uncleaned forces are kept for a second cleaning, if slow hum shows in the residual of the first diagnosis.
     let known = problem.disturbances.clone();
     let raw = (problem.measured.clone(), problem.removed.clone());
     let with = |found: Vec<Disturbance>| known.iter().cloned().chain(found).collect();
@@ -194,10 +209,12 @@ pub fn diagnose(problem: &mut DiagnosisProblem, supply: &dyn ColumnProvider) -> 
         unexplained,
         ..
     } = &diagnosis;
+    // A hum among the frequencies of the motion is visible only after the model has been fitted.
     let slow = hum::slow_lines(problem, rest, again, unexplained);
     if slow.is_empty() {
         return diagnosis;
     }
+    // Start again from the original forces without that hum.
     (problem.measured, problem.removed) = raw;
     let cleaned = cleaning::clean_with_slow_lines(problem, &slow);
     diagnose_cleaned(problem, supply, with(cleaned))
@@ -211,19 +228,24 @@ fn diagnose_cleaned(
 ) -> ModelDiagnosis {
     let mut bench = EffectSelector::new(problem, supply);
     bench.update_choices(&[]);
+    // Stage 1: forward search over sets of effects.
     let alone = bench.explained_by_each();
     let found = bench.search_sets();
     let picks = found.steps.last().map_or(Vec::new(), |s| s.picks.clone());
+    // Report the steps with their errors; the first entry is the model without any effect.
     let mut ladder = vec![bench.selection_step(&[], &[], None)];
     let mut before: Vec<SelectedEffect> = Vec::new();
     for step in &found.steps {
         ladder.push(bench.selection_step(&before, &step.picks, step.evidence));
         before.clone_from(&step.picks);
     }
+    // Stage 2: drop effects that explain less than what stays unexplained on their channels.
     let (mut picks, mut left) = bench.drop_below_unexplained(picks);
     if picks.len() < before.len() {
         ladder.push(bench.selection_step(&before, &picks, None));
     }
+    // Stage 3: propose laws for the unexplained residual. Effects that such a law contains are dropped, if the law
+    // still explains as much without them.
     let (mut sites, mut laws) = bench.find_laws(&picks, &left);
     let needed = bench.effects_outside_laws(&picks, &laws);
     if needed.len() < picks.len() {
@@ -231,9 +253,9 @@ fn diagnose_cleaned(
         let (sites_then, laws_then) = bench.find_laws(&needed, &left_then);
         let stands = |law: &LawProposal| {
             let is_its = |then: &LawProposal| {
-                then.channels == law.channels && then.law.gain >= MIN_LAW_SHARE
+                then.channels == law.channels && then.law.gain >= REPLACING_LAW_LEAST_SHARE
             };
-            law.law.gain < MIN_LAW_SHARE || laws_then.iter().any(is_its)
+            law.law.gain < REPLACING_LAW_LEAST_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
             ladder.push(bench.selection_step(&picks, &needed, None));
@@ -245,7 +267,7 @@ fn diagnose_cleaned(
         repeatable_share: mut again,
         mut unexplained,
     } = left;
-    // What a law foretells comes again.
+    // The part of the residual that a law predicts is repeatable.
     for proposal in &laws {
         for d in &proposal.channels {
             again[*d] = again[*d].max(proposal.law.gain);
@@ -255,6 +277,7 @@ fn diagnose_cleaned(
         }
     }
     unexplained.sort_unstable();
+    // Stage 4: indistinguishable alternatives, the origin of the residual, disturbances and estimates.
     let aliases = bench.find_aliases(&picks);
     bench.weigh_channels(&picks);
     let (budgets, coloured) = bench.residual_budgets(&picks, &rest, &again);
@@ -267,6 +290,7 @@ fn diagnose_cleaned(
         if candidate.nature == CandidateNature::Disturbance {
             continue;
         }
+        // Only other causes share the probability; another form of the same effect does not.
         let rivals = aliases.iter().filter(|alias| !alias.is_equivalent_form);
         let rivals: Vec<f64> = rivals.map(|alias| alias.criterion_loss).collect();
         let (values, deviations) = estimates[i].iter().copied().unzip();
@@ -281,6 +305,7 @@ fn diagnose_cleaned(
         });
     }
     merge_drifting_friction(&mut effects, &mut disturbances);
+    // Unexplained residual decides before effects that were found.
     let verdict = match (unexplained.is_empty(), effects.is_empty()) {
         (false, _) => DiagnosisVerdict::Unexplained,
         (true, true) => DiagnosisVerdict::Adequate,
@@ -305,7 +330,7 @@ fn diagnose_cleaned(
     }
 }
 
-/// Friction that the model lacks and that drifts besides is one effect: friction that changes with time.
+/// Joins friction that is missing and also drifts into one effect: friction that changes with time.
 fn merge_drifting_friction(
     effects: &mut Vec<IdentifiedEffect>,
     disturbances: &mut Vec<Disturbance>,
@@ -324,12 +349,12 @@ fn merge_drifting_friction(
         effects.retain(|found| !is_its(found));
         drift.kind.clone_into(&mut merged.effect.kind);
         effects.insert(at.min(effects.len()), merged);
-        // What it changes by is told besides.
+        // The drift stays in the list of disturbances, which reports by how much the friction changes.
         true
     });
 }
 
-/// Noise of all channels relative to the measured forces.
+/// Root of the summed squares of the channels' noise, relative to that of their forces; 0 without force.
 fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
     let sum =
         |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
@@ -341,17 +366,19 @@ fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
     }
 }
 
-/// What a set leaves.
+/// Residual of a set of effects.
 struct SetResidual {
-    /// `[channel][sample]`
+    /// `[channel][sample]`, N or N m.
     residual: Vec<Vec<f64>>,
-    /// Share of each channel's squares that comes again.
+    /// Repeatable share of each channel's squares, 0 to 1.
     repeatable_share: Vec<f64>,
-    /// Channels of which that is more than noise.
+    /// Indices of the channels whose repeatable residual is more than noise.
     unexplained: Vec<usize>,
 }
 
 impl EffectSelector<'_> {
+    /// Residual of a set that is fitted to all samples, with its repeatable share; sets the weights of the channels
+    /// from it.
     fn set_residual(&mut self, picks: &[SelectedEffect]) -> SetResidual {
         self.weigh_channels(picks);
         let (factors, _) = self.fit(picks, FitScope::All);
@@ -368,7 +395,8 @@ impl EffectSelector<'_> {
         }
     }
 
-    /// Laws for what a set leaves, and where they may act.
+    /// Proposes laws for the residual of a set, with the places where they may act; empty if only effects are
+    /// requested.
     fn find_laws(
         &self,
         picks: &[SelectedEffect],
@@ -385,8 +413,8 @@ impl EffectSelector<'_> {
         laws::propose_laws(self, picks, &left, self.provider)
     }
 
-    /// The members of a set that laws do not make needless: an effect that goes where a law for most of the rest comes is part of
-    /// that law, if it acts on drives that feel the law.
+    /// Members of a set that proposed laws do not make unnecessary. An effect that a law replaces is part of it, if the
+    /// law explains most of the residual and acts on all channels of the effect.
     fn effects_outside_laws(
         &self,
         picks: &[SelectedEffect],
@@ -395,7 +423,7 @@ impl EffectSelector<'_> {
         let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
             let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
-            proposal.law.gain >= MIN_LAW_SHARE
+            proposal.law.gain >= REPLACING_LAW_LEAST_SHARE
                 && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
@@ -404,14 +432,15 @@ impl EffectSelector<'_> {
         picks.iter().filter(is_needed).cloned().collect()
     }
 
-    /// A set without members that explain less than what stays unexplained where they act, and what it leaves: part of a law that
-    /// nobody knows is as likely there as the effect.
+    /// Drops members that explain less than what stays unexplained on their channels, the weakest first, and returns
+    /// the set with its residual. There an unknown law is as likely as the effect.
     fn drop_below_unexplained(
         &mut self,
         mut picks: Vec<SelectedEffect>,
     ) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
             let left = self.set_residual(&picks);
+            // Find the member whose gain is smallest relative to the unexplained repeatable squares on its channels.
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
                 let channels = self.affected_channels(&picks[i..=i]);
@@ -424,6 +453,7 @@ impl EffectSelector<'_> {
                 if stays <= 0.0 {
                     continue;
                 }
+                // Gain of the member: squares that come back when the set is fitted without it.
                 let mut fewer = picks.clone();
                 fewer.remove(i);
                 let fewer = self.refresh_columns(fewer);
@@ -435,7 +465,9 @@ impl EffectSelector<'_> {
                     .iter()
                     .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
                 let share = gains.sum::<f64>() / stays;
-                if share < 1.0 && least.as_ref().is_none_or(|(other, _)| share < *other) {
+                if share < EFFECT_LEAST_UNEXPLAINED_RATIO
+                    && least.as_ref().is_none_or(|(other, _)| share < *other)
+                {
                     least = Some((share, fewer));
                 }
             }
@@ -446,15 +478,15 @@ impl EffectSelector<'_> {
         }
     }
 
-    /// Whether what is left of a channel is more than noise: it comes again with the state, by a share that an effect would be
-    /// added for.
+    /// Whether the residual of a channel is more than noise: a part of it is repeatable, and that share would be enough
+    /// to add an effect. `again` is the repeatable share.
     fn is_unexplained(&self, channel: usize, rest: &[f64], again: f64) -> bool {
         let squares = dot(rest, rest) / rest.len().max(1) as f64;
         let noise = self.problem.noise[channel].powi(2);
         squares > noise && again > LEAST_GAIN
     }
 
-    /// Share of the squared error of the model as it is that each candidate explains alone.
+    /// Share of the squared error of the unchanged model that each candidate explains alone, `[candidate]`, 0 to 1.
     fn explained_by_each(&self) -> Vec<f64> {
         let table = self.projected_gram(&[]);
         let total = self.fit_from_gram(&table, Vec::new()).squares;
@@ -467,6 +499,7 @@ impl EffectSelector<'_> {
         self.current_choices.iter().map(share).collect()
     }
 
+    /// A step from one set to another, with the errors of the later one.
     fn selection_step(
         &self,
         before: &[SelectedEffect],
@@ -491,7 +524,8 @@ impl EffectSelector<'_> {
         }
     }
 
-    /// Relative errors on fit and check, and of each channel on the check, fitted to the fit; without a check by cross-validation.
+    /// Relative errors of a set that is fitted to the recordings of the fit: on these, on the validation runs, and per
+    /// channel on the validation runs. Without any, cross-validation gives the last two.
     fn relative_errors(&self, picks: &[SelectedEffect]) -> (f64, f64, Vec<f64>) {
         let layout = &self.problem.layout;
         let split = layout.fit_samples();
@@ -517,7 +551,7 @@ impl EffectSelector<'_> {
         let errors = if layout.has_check() {
             squares(&rest, judged.clone())
         } else {
-            // Weights differ by channel, figures do not.
+            // Validation errors are weighted by channel; reported errors are not.
             let held_out = |d: usize| {
                 self.validation_errors(picks, &[d], true)
                     .iter()
@@ -532,7 +566,8 @@ impl EffectSelector<'_> {
         (fit, whole(&errors, &forces), by_channel.collect())
     }
 
-    /// What a set leaves where it is fitted to the fit. What decides nothing counts, but for what is left out altogether.
+    /// Residual of a set that is fitted to the recordings of the fit, `[channel][sample]`. Samples at reversals count
+    /// here; samples that are left out of the diagnosis are zero.
     fn full_residual(&self, picks: &[SelectedEffect]) -> Vec<Vec<f64>> {
         let (factors, _) = self.fit(picks, FitScope::Fit);
         let columns = self.columns(picks);
@@ -545,8 +580,9 @@ impl EffectSelector<'_> {
         rest
     }
 
-    /// Whether a change makes what is left larger where everything counts, in the fit and in the check: then it explains what
-    /// decides at the cost of what lies next to reversals, where an effect would be seen, too.
+    /// Whether a change raises the squared residual over all samples, reversals included, in the fit and in the
+    /// validation runs. Then it explains the samples that decide at the cost of those next to reversals, where an
+    /// effect would act too.
     fn is_worse_overall(
         &self,
         before: &[SelectedEffect],
@@ -570,7 +606,7 @@ impl EffectSelector<'_> {
         rises(0..split) && (!layout.has_check() || rises(split..layout.samples()))
     }
 
-    /// What became of every candidate.
+    /// Result for every candidate: found, or rejected with the reason.
     fn candidate_outcomes(
         &mut self,
         picks: &[SelectedEffect],
@@ -587,6 +623,7 @@ impl EffectSelector<'_> {
         let mut considered: Vec<CandidateOutcome> = Vec::new();
         for (k, candidate) in self.problem.candidates.iter().enumerate() {
             let picked = picks.iter().position(|p| p.candidate == k);
+            // Three cases: part of the final set, tested and rejected by the search, or never among the best.
             let (gain, refused) = if let Some(i) = picked {
                 let mut without = picks.to_vec();
                 let pick = without.remove(i);
@@ -594,14 +631,14 @@ impl EffectSelector<'_> {
                 (self.evidence(&without, picks, &channels).gain, None)
             } else if let Some(refused) = found.rejected.iter().find(|r| r.pick.candidate == k) {
                 let why = if refused.wrong_sign {
-                    "sign"
+                    WRONG_SIGN
                 } else if refused.cancels {
                     CANCELS
                 } else {
                     refused
                         .evidence
                         .insufficiency_reason(has_check)
-                        .unwrap_or("another explains more")
+                        .unwrap_or(EXPLAINED_BETTER)
                 };
                 (refused.evidence.gain, Some(why.to_owned()))
             } else if let Some(pick) = &self.current_choices[k] {
@@ -614,13 +651,13 @@ impl EffectSelector<'_> {
                     0.0
                 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
-                    "sign"
+                    WRONG_SIGN
                 } else if trial.cancelling.contains(&picks.len()) {
                     CANCELS
                 } else if gain < LEAST_GAIN {
                     "explains nothing that is left"
                 } else {
-                    "another explains more"
+                    EXPLAINED_BETTER
                 };
                 (gain, Some(why.to_owned()))
             } else {
@@ -633,6 +670,7 @@ impl EffectSelector<'_> {
                 rejection_reason: refused,
             });
         }
+        // Found effects first, then by the share that each explains alone.
         considered.sort_by(|a, b| {
             (b.rejection_reason
                 .is_none()

@@ -1,4 +1,4 @@
-//! Inner products of columns, channel by channel and apart for fit and check, so that any set of columns is fitted in
+//! Inner products of columns, by channel and separately for fit and validation, so that any set of columns is fitted in
 //! microseconds.
 //!
 //! Decision: a search fits many thousands of sets, so samples are read once. Weights, which change with each
@@ -18,40 +18,47 @@ use super::numbered::ColumnMap;
 use super::problem::SampleLayout;
 use super::tile;
 
-/// Inner products of a column with earlier ones by part (0 is the fit, 1 the check) and channel on which both act, the parts one
-/// after the other; or by fold and channel.
+/// Inner products of a column with earlier ones, by part (0 is the fit, 1 the validation) and channel on which both
+/// act, first all channels of one part. In the maps for folds they are ordered by fold and channel.
 type PairProducts = ColumnMap<Box<[f64]>>;
-/// Inner products of fewer numbers are made as they stand.
+/// Inner products of fewer numbers are computed without dispatch to vector instructions.
 const SHORT: usize = 64;
-/// Sums that an inner product has at once.
+/// Number of partial sums of an inner product.
 pub(crate) const LANES: usize = 16;
 /// Folds of the cross-validation where there is no check.
 const FOLDS: usize = 10;
-/// Fewer inner products of a tile are made one by one.
+/// If fewer products of a tile are unknown, they are computed one by one.
 const FEW: usize = 3;
 
-/// Columns with their inner products, each of which is computed when it is asked for first.
+/// Columns with their inner products, each of which is computed when it is first needed.
 pub(crate) struct ColumnPool<'a> {
+    /// The columns; callers refer to them by index.
     columns: Vec<Cow<'a, ForceColumn>>,
-    /// Channels on which each column acts, a bit for each.
+    /// Channels on which each column acts, one bit per channel.
     acts: Vec<Box<[u64]>>,
-    /// How many there are.
+    /// Number of channels.
     channels: usize,
+    /// Samples of the fit.
     fit: Range<usize>,
+    /// Samples of the validation runs.
     check: Range<usize>,
+    /// Known inner products of each column.
     products: RefCell<Vec<PairProducts>>,
+    /// Known inner products of each column by fold.
     of_folds: RefCell<Vec<PairProducts>>,
     /// Folds of all samples.
     folds: Vec<Range<usize>>,
-    /// Samples that were not measured, by channel: nothing counts them.
+    /// Samples that were not measured, `[channel][sample]`: they never count.
     lost: Vec<Vec<bool>>,
-    /// Samples that are left out of every product, by channel and in order; the lost ones are among them.
+    /// Indices of the samples that are excluded from every product, by channel and sorted; those that were not measured
+    /// are among them.
     left_out: Vec<Vec<usize>>,
-    /// What is known of the factors of the first columns beforehand, as further equations: the inverse of their covariance.
+    /// Prior knowledge of the factors of the first columns, as further equations: the inverse of their covariance.
     pub(crate) prior_equations: Option<DMatrix<f64>>,
 }
 
 impl<'a> ColumnPool<'a> {
+    /// An empty pool for a layout of samples.
     pub(crate) fn new(layout: &SampleLayout) -> Self {
         let fit = layout.fit_samples();
         Self {
@@ -73,8 +80,9 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// Leaves further samples out of all products and of what is left.
+    /// Excludes further samples, `[channel][sample]`, from all products and residuals.
     pub(crate) fn exclude_samples(mut self, left_out: &[Vec<bool>]) -> Self {
+        // Unite the new exclusions with the samples that were not measured.
         let all = left_out.iter().enumerate().map(|(d, out)| {
             let lost = self.lost.get(d);
             let either = out.iter().enumerate().map(|(i, out)| {
@@ -88,7 +96,7 @@ impl<'a> ColumnPool<'a> {
         self
     }
 
-    /// Inner product of two columns' values on a channel over some samples, without those that are left out.
+    /// Inner product of two columns' values on a channel over a range of samples, without excluded ones.
     pub(crate) fn inner_product(
         &self,
         channel: usize,
@@ -100,7 +108,7 @@ impl<'a> ColumnPool<'a> {
         dot(&a[range.clone()], &b[range]) - less
     }
 
-    /// What samples that are left out would add to an inner product.
+    /// Contribution of the excluded samples to an inner product.
     fn excluded_product(&self, channel: usize, a: &[f64], b: &[f64], range: &Range<usize>) -> f64 {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < range.start);
@@ -108,12 +116,12 @@ impl<'a> ColumnPool<'a> {
         out[from..to].iter().map(|i| a[*i] * b[*i]).sum()
     }
 
-    /// All samples.
+    /// Range of all samples.
     pub(crate) fn all_samples(&self) -> Range<usize> {
         0..self.check.end
     }
 
-    /// Makes a series that begins at a sample zero where samples are left out.
+    /// Sets the excluded samples of a series to zero; the series begins at the sample `start`.
     pub(crate) fn zero_excluded(&self, channel: usize, start: usize, values: &mut [f64]) {
         let out = self.left_out.get(channel).map_or(&[][..], Vec::as_slice);
         let from = out.partition_point(|i| *i < start);
@@ -123,9 +131,10 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// Adds a column; its place.
+    /// Adds a column and returns its index.
     pub(crate) fn add(&mut self, column: impl Into<Cow<'a, ForceColumn>>) -> usize {
         let column = column.into();
+        // Store the channels as bits, so that common channels are found without reading values.
         let mut acts = vec![0; column.0.len().div_ceil(64)];
         for d in column.channels() {
             acts[d / 64] |= 1 << (d % 64);
@@ -137,11 +146,12 @@ impl<'a> ColumnPool<'a> {
         self.columns.len() - 1
     }
 
+    /// Number of columns, released ones included.
     pub(crate) fn len(&self) -> usize {
         self.columns.len()
     }
 
-    /// Takes the columns from a place on out again, with all their products.
+    /// Removes all columns from an index on, with their products, and returns them.
     pub(crate) fn split_off(&mut self, known: usize) -> Vec<Cow<'a, ForceColumn>> {
         self.acts.truncate(known);
         self.products.get_mut().truncate(known);
@@ -149,7 +159,7 @@ impl<'a> ColumnPool<'a> {
         self.columns.split_off(known)
     }
 
-    /// Lets go of what a column holds; its place is not given to another.
+    /// Releases the memory of a column; its index is not used again.
     pub(crate) fn release_column(&mut self, k: usize) {
         self.acts[k].fill(0);
         self.columns[k] = Cow::Owned(ForceColumn::default());
@@ -157,29 +167,33 @@ impl<'a> ColumnPool<'a> {
         self.of_folds.get_mut()[k] = PairProducts::default();
     }
 
+    /// The column with an index.
     pub(crate) fn column(&self, k: usize) -> &ForceColumn {
         &self.columns[k]
     }
 
-    /// The values of a column on a channel; `None` where they are zero throughout.
+    /// Values of a column on a channel; `None` where they are all zero.
     fn values(&self, k: usize, channel: usize) -> Option<&[f64]> {
         self.columns[k].0.get(channel)?.as_deref()
     }
 
+    /// Whether a column acts on a channel.
     fn acts_on(&self, k: usize, channel: usize) -> bool {
+        // One bit per channel, 64 in a word.
         let word = self.acts[k].get(channel / 64);
         word.is_some_and(|word| word >> (channel % 64) & 1 == 1)
     }
 
-    /// Whether two columns act on a channel both.
+    /// Whether there is a channel on which both columns act.
     fn has_common_channel(&self, a: usize, b: usize) -> bool {
         let mut words = self.acts[a].iter().zip(&*self.acts[b]);
         words.any(|(a, b)| a & b != 0)
     }
 
-    /// Inner products of two columns by part and common channel.
+    /// Computes the inner products of two columns by part and common channel.
     fn products_of(&self, a: usize, b: usize) -> Box<[f64]> {
         let [a, b] = [a, b].map(|k| &self.columns[k]);
+        // Fit and validation separately, each over the common channels.
         let parts = [&self.fit, &self.check].into_iter();
         let of_part = |range: &Range<usize>| {
             let range = range.clone();
@@ -189,20 +203,23 @@ impl<'a> ColumnPool<'a> {
         parts.flat_map(of_part).collect()
     }
 
-    /// Computes the inner products of some columns that are not known yet, those of neighbours together.
+    /// Computes the unknown inner products of some columns, in tiles of neighbouring columns.
     pub(crate) fn compute_products(&self, which: &[usize]) {
         let mut which = which.to_vec();
-        // Neighbours act on the same channels.
+        // Sorted by channels, the columns of a tile mostly act on the same ones.
         which.sort_unstable_by_key(|k| (&self.acts[*k], *k));
         which.dedup();
         let mut products = self.products.borrow_mut();
+        // Every pair of groups is a tile of at most SIDE x SIDE products.
         let groups: Vec<&[usize]> = which.chunks(tile::SIDE).collect();
         for (i, rows) in groups.iter().enumerate() {
             for columns in &groups[..=i] {
                 let mut unknown = Vec::with_capacity(tile::SIDE * tile::SIDE);
                 for (r, a) in rows.iter().enumerate() {
                     for (c, b) in columns.iter().enumerate() {
+                        // A tile on the diagonal has each pair twice.
                         let is_twice = rows == columns && c > r;
+                        // A product is stored with the column of the larger index.
                         let (later, earlier) = (*a.max(b), a.min(b));
                         if !is_twice
                             && self.has_common_channel(*a, *b)
@@ -215,6 +232,7 @@ impl<'a> ColumnPool<'a> {
                 if unknown.len() < FEW {
                     continue; // Single products cost less.
                 }
+                // One pass over the samples gives all unknown products of the tile.
                 let made = self.compute_tile(rows, columns, &unknown);
                 for ((r, c), found) in unknown.into_iter().zip(made) {
                     let (a, b) = (rows[r], columns[c]);
@@ -224,7 +242,8 @@ impl<'a> ColumnPool<'a> {
         }
     }
 
-    /// The same as [`Pool::products_of`] of some pairs of a tile, in their order.
+    /// The same as [`Self::products_of`] for some pairs of a tile, in their order; a pair is (row, column) within the
+    /// tile.
     fn compute_tile(
         &self,
         rows: &[usize],
@@ -236,6 +255,7 @@ impl<'a> ColumnPool<'a> {
             for d in 0..self.channels {
                 let r: [_; tile::SIDE] = array::from_fn(|k| self.values(*rows.get(k)?, d));
                 let c: [_; tile::SIDE] = array::from_fn(|k| self.values(*columns.get(k)?, d));
+                // No row of the tile acts on this channel.
                 let Some(any) = r.iter().flatten().next() else {
                     continue;
                 };
@@ -245,7 +265,7 @@ impl<'a> ColumnPool<'a> {
                 {
                     continue;
                 }
-                // Those that do not act here stand in for nothing.
+                // Columns that do not act on this channel are replaced by any other one; their products are not used.
                 let rows = r.map(|one| &one.unwrap_or(any)[part.clone()]);
                 let columns = c.map(|one| &one.unwrap_or(any)[part.clone()]);
                 let sums = tile::tile_products(rows, columns);
@@ -259,12 +279,12 @@ impl<'a> ColumnPool<'a> {
         found.into_iter().map(Vec::into_boxed_slice).collect()
     }
 
-    /// Weighted inner product of two columns on all samples.
+    /// Inner product of two columns on all samples, weighted by channel.
     pub(crate) fn weighted_product(&self, a: usize, b: usize, weights: &[f64]) -> f64 {
         self.scoped_product(a, b, weights, FitScope::All)
     }
 
-    /// The same of columns that need not be in the pool, computed anew.
+    /// The same for columns that are not in the pool; nothing is stored.
     pub(crate) fn weighted_product_of(
         &self,
         a: &ForceColumn,
@@ -275,17 +295,20 @@ impl<'a> ColumnPool<'a> {
         a.common_channels(b).map(on).sum()
     }
 
+    /// Inner product of two columns on fit or all samples, weighted by channel; computed at the first call.
     fn scoped_product(&self, a: usize, b: usize, weights: &[f64], on: FitScope) -> f64 {
         if !self.has_common_channel(a, b) {
             return 0.0;
         }
+        // Products are stored with the column of the larger index.
         let (a, b) = (a.max(b), a.min(b));
         let mut products = self.products.borrow_mut();
         let known = products[a]
             .entry(b)
             .or_insert_with(|| self.products_of(a, b));
+        // First half: products on the fit; second half: on the validation runs.
         let (fit, check) = known.split_at(known.len() / 2);
-        // Which channels these are is told without a look at the columns.
+        // The bits give the common channels without reading the columns.
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
         let sums = common.zip(fit.iter().zip(check)).map(|(d, (fit, check))| {
             weights[d]
@@ -298,12 +321,13 @@ impl<'a> ColumnPool<'a> {
         sums.sum()
     }
 
-    /// Weighted inner products of some columns on fit, check or both.
+    /// Matrix of weighted inner products of some columns on fit or all samples, with the prior equations added.
     pub(crate) fn gram(&self, which: &[usize], weights: &[f64], on: FitScope) -> DMatrix<f64> {
         let n = which.len();
         let mut gram = DMatrix::zeros(n, n);
         for i in 0..n {
             for j in 0..=i {
+                // The matrix is symmetric, so one half is computed.
                 let sum = self.scoped_product(which[i], which[j], weights, on)
                     + self.prior_term(which[i], which[j]);
                 gram[(i, j)] = sum;
@@ -313,7 +337,7 @@ impl<'a> ColumnPool<'a> {
         gram
     }
 
-    /// What is known of two factors before any sample, as part of their inner product.
+    /// Entry of the prior equations for two factors; zero without prior.
     fn prior_term(&self, a: usize, b: usize) -> f64 {
         let entry = self
             .prior_equations
@@ -322,7 +346,7 @@ impl<'a> ColumnPool<'a> {
         entry.copied().unwrap_or(0.0)
     }
 
-    /// Weighted inner products of some columns on each fold.
+    /// Matrices of weighted inner products of some columns, one for each fold with its range of samples.
     pub(crate) fn fold_grams(
         &self,
         which: &[usize],
@@ -331,11 +355,12 @@ impl<'a> ColumnPool<'a> {
         let n = which.len();
         let mut grams = vec![DMatrix::zeros(n, n); self.folds.len()];
         let mut products = self.of_folds.borrow_mut();
+        // Weights of the common channels of a pair.
         let mut common: Vec<f64> = Vec::new();
         for i in 0..n {
             for j in 0..=i {
                 let (a, b) = (which[i].max(which[j]), which[i].min(which[j]));
-                // Each fold has its share of it.
+                // The prior is divided equally between the folds.
                 let before = self.prior_term(a, b) / self.folds.len() as f64;
                 for gram in &mut grams {
                     gram[(i, j)] = before;
@@ -344,6 +369,7 @@ impl<'a> ColumnPool<'a> {
                 if !self.has_common_channel(a, b) {
                     continue;
                 }
+                // Common channels of both columns, with their values.
                 let both = || self.columns[a].common_channels(&self.columns[b]);
                 common.clear();
                 common.extend(both().map(|(d, ..)| weights[d]));
@@ -354,6 +380,7 @@ impl<'a> ColumnPool<'a> {
                     };
                     self.folds.iter().flat_map(of_fold).collect()
                 });
+                // Weighted sum over the channels of each fold.
                 for (gram, part) in grams.iter_mut().zip(known.chunks(common.len())) {
                     let sum: f64 = part.iter().zip(&common).map(|(p, w)| p * w).sum();
                     gram[(i, j)] = sum + before;
@@ -364,7 +391,7 @@ impl<'a> ColumnPool<'a> {
         self.folds.iter().cloned().zip(grams).collect()
     }
 
-    /// What is left of the column `of` when others are taken off with some factors; zero where samples are left out.
+    /// Column `of` minus the other columns times their factors, `[channel][sample]`; zero at excluded samples.
     pub(crate) fn residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         let mut rest = self.full_residual(of, others, factors);
         for (d, rest) in rest.iter_mut().enumerate() {
@@ -373,17 +400,19 @@ impl<'a> ColumnPool<'a> {
         rest
     }
 
-    /// The same of all samples but those that were not measured.
+    /// The same with excluded samples kept; only those that were not measured are zero.
     pub(crate) fn full_residual(
         &self,
         of: usize,
         others: &[usize],
         factors: &[f64],
     ) -> Vec<Vec<f64>> {
+        // Start with the column and subtract the others one after the other.
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
             .map(|values| values.clone().unwrap_or_else(|| vec![0.0; samples]))
             .collect();
+        // Channels on which a column is zero are skipped.
         for (k, factor) in others.iter().zip(factors) {
             for (rest, values) in rest.iter_mut().zip(&self.columns[*k].0) {
                 if let Some(values) = values {
@@ -400,19 +429,20 @@ impl<'a> ColumnPool<'a> {
     }
 }
 
-/// Where something is said, in order.
+/// Indices of the true entries, ascending.
 fn true_indices(said: &[bool]) -> Vec<usize> {
     let samples = said.iter().enumerate();
     samples.filter_map(|(i, said)| said.then_some(i)).collect()
 }
 
+/// Sets values to zero where `out` is true.
 fn zero_where(values: &mut [f64], out: &[bool]) {
     for (value, _) in values.iter_mut().zip(out).filter(|(_, out)| **out) {
         *value = 0.0;
     }
 }
 
-/// Samples that count.
+/// Samples to which a set is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FitScope {
     /// Those of the fit.
@@ -421,10 +451,10 @@ pub(crate) enum FitScope {
     All,
 }
 
-/// Inner product; several sums at once, which is faster and rounds less. The sums are the same in vectors of any width, so that
-/// a diagnosis decides alike on every machine.
+/// Inner product of two series. Several partial sums are faster and round less. They do not depend on the width of the
+/// vectors, so that a diagnosis decides equally on every machine.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    // Of a few numbers the choice would cost more than the sum.
+    // For a few numbers the dispatch would cost more than the sum.
     if a.len() < SHORT {
         return sum_products(a, b);
     }
@@ -433,11 +463,13 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 #[allow(
     clippy::inline_always,
-    reason = "what is inlined has the vectors of its caller"
+    reason = "inlined code uses the vector instructions of its caller"
 )]
+/// Inner product with [`LANES`] partial sums; see [`dot`].
 #[inline(always)]
 fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
+    // Groups of LANES numbers, each with its own partial sum; the tail is added at the end.
     let (chunks_a, chunks_b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let tail: f64 = chunks_a
         .remainder()
@@ -453,15 +485,17 @@ fn sum_products(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + tail
 }
 
-/// A least squares fit from inner products: factors of the first columns, by which the last is explained best, and the
-/// sum of squares that is left. Columns that depend on those before them get the factor zero.
+/// Least squares fit from inner products: factors of the first columns that explain the last column best, and the sum
+/// of squares of the residual. Columns that depend on earlier ones get the factor zero.
 pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     let n = gram.nrows() - 1;
-    // Cholesky's decomposition with columns scaled to 1; rows of the factor are columns here, which lie in one piece.
+    // Cholesky decomposition with columns scaled to 1. It is stored transposed, so that each row of the factor is
+    // contiguous.
     let scale: Vec<f64> = (0..=n).map(|i| gram[(i, i)].sqrt()).collect();
     let mut upper = DMatrix::<f64>::zeros(n + 1, n + 1);
     let mut kept = vec![false; n];
     for i in 0..=n {
+        // A column of zeros stays without a factor.
         if scale[i] == 0.0 {
             continue;
         }
@@ -469,11 +503,14 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
             if j < i && !kept[j] {
                 continue;
             }
+            // The part that earlier columns of the factor explain.
             let known = dot(
                 &upper.column(i).as_slice()[..j],
                 &upper.column(j).as_slice()[..j],
             );
             let sum = gram[(j, i)] / (scale[i] * scale[j]) - known;
+            // Off-diagonal entry, squared residual of the last column, or a new diagonal entry; dependent columns are
+            // cleared.
             if j < i {
                 upper[(j, i)] = sum / upper[(j, j)];
             } else if i == n {
@@ -486,6 +523,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
             }
         }
     }
+    // Back substitution for the independent columns; then undo the scaling.
     let mut factors = DVector::zeros(n);
     for i in (0..n).rev() {
         if !kept[i] {
@@ -507,7 +545,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
     (factors, upper[(n, n)] * scale[n] * scale[n])
 }
 
-/// Share of a column's squares below which what others leave of it is rounding.
+/// A column is dependent if less than this share of its squares remains after the projection on the others.
 pub(crate) const DEPENDENT: f64 = 1e-9;
 
 #[cfg(test)]
@@ -558,7 +596,7 @@ mod tests {
         let weighed = dot(&residual[0], &residual[0]) + 4.0 * dot(&residual[1], &residual[1]);
         assert!((weighed - rest).abs() < 1e-9 * rest);
     }
-    /// What stands in the place of a force that was not measured moves nothing.
+    /// Values in place of a force that was not measured have no influence.
     #[test]
     fn forces_that_lack_have_no_say() {
         let wave = |k: f64| -> Vec<f64> { (0..50).map(|i| (k * f64::from(i)).sin()).collect() };

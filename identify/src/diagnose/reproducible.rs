@@ -1,13 +1,13 @@
-//! What of a residual would come again: a flexible function of the state is fitted to it and held against time that it has
-//! not seen. What that explains no noise can be, whether a library knows its law or not.
+//! The repeatable part of a residual. A flexible function of the state is fitted to it and tested on time that was not
+//! fitted. What it explains there cannot be noise, whether a library has a law for it or not. Input: residual and state
+//! variables; output: the repeatable share of each channel.
 //!
-//! The functions are all products of up to three variables (two if there are many) and smooth signs of the rates, with a
-//! ridge whose strength is chosen by the same folds.
+//! The functions are all products of up to three variables (two if there are many) and smooth signs of the rates, with
+//! a ridge whose strength is chosen by the same folds.
 //!
-//! Decision: a residual above the noise may be a law or coloured noise, and its autocorrelation does not
-//! distinguish them. A flexible function of the state does: what it explains in folds that it has not seen is
-//! repeatable. A residual that is not repeatable is reported as noise, however much its neighbours resemble each
-//! other.
+//! Decision: a residual above the noise may be a law or coloured noise, and its autocorrelation does not distinguish
+//! them. A flexible function of the state does: what it explains in folds that were not fitted is repeatable. A
+//! residual that is not repeatable is reported as noise, however strongly its neighbours are correlated.
 
 use std::ops::Range;
 
@@ -15,30 +15,32 @@ use nalgebra::{DMatrix, DVector};
 
 use super::problem::SampleLayout;
 
-/// Folds over all recordings.
+/// Number of folds in each segment.
 const FOLDS: usize = 8;
-/// Samples that are looked at, at most; fewer where there are many functions.
+/// Largest number of samples; the number of features from which on fewer samples are used, and that number.
 const MOST: usize = 6000;
 const MOST_FEATURES: usize = 1500;
 const MOST_OF_MANY: usize = 1500;
-/// Strengths of the ridge, relative to a function's own squares.
+/// Strengths of the ridge regularisation, relative to the squares of each feature.
 const RIDGES: [f64; 5] = [1e-6, 1e-4, 1e-2, 1e-1, 1.0];
 
-/// Quantiles of a position beyond which stops may begin, percent from either end.
+/// Quantiles of a position beyond which end stops may begin, percent from either end.
 const HINGE_QUANTILES: [usize; 4] = [3, 8, 15, 30];
-/// Lengths over which friction may remember, in units of a position's spread.
+/// Lengths over which friction depends on the past motion, in units of a position's standard deviation.
 const MEMORIES: [f64; 3] = [0.02, 0.08, 0.3];
 
-/// Half widths of what is dragged along a position, in units of its spread.
+/// Half widths of the play of hysteresis along a position, in units of its standard deviation.
 const STOPS: [f64; 4] = [0.05, 0.15, 0.4, 1.0];
 
-/// How much of each channel's squared residual comes again where it was not fitted, between 0 and 1.
+/// Share of each channel's squared residual that is repeatable on data that was not fitted, 0 to 1, `[channel]`.
 pub(crate) fn repeatable_shares(
     layout: &SampleLayout,
     variables: &[(String, Vec<f64>)],
     rest: &[Vec<f64>],
 ) -> Vec<f64> {
+    // Take equally spaced samples.
     let n = layout.samples();
+    // Many features need many operations, so fewer samples are used then.
     let count = feature_count(variables.len());
     let most = if count > MOST_FEATURES {
         MOST_OF_MANY
@@ -50,23 +52,27 @@ pub(crate) fn repeatable_shares(
     if features.is_empty() {
         return vec![0.0; rest.len()];
     }
+    // Blocks of samples become ranges among the selected samples.
     let folds: Vec<Range<usize>> = (layout.blocks(FOLDS).iter())
         .map(|block| {
             let at = |sample: usize| picked.partition_point(|i| *i < sample);
             at(block.start)..at(block.end)
         })
         .collect();
+    // Residuals of all channels at the selected samples, as columns.
     let target = |r: &Vec<f64>| DVector::from_iterator(picked.len(), picked.iter().map(|i| r[*i]));
     let targets: Vec<DVector<f64>> = rest.iter().map(target).collect();
     let targets = DMatrix::from_columns(&targets);
     let columns: Vec<DVector<f64>> = features.into_iter().map(DVector::from).collect();
     let features = DMatrix::from_columns(&columns);
+    // Solve in the smaller dimension: features or samples.
     let held_out = if features.ncols() <= features.nrows() {
         errors_by_features(&features, &targets, &folds)
     } else {
         errors_by_samples(features, &targets, &folds)
     };
     let totals = targets.column_iter().map(|target| target.norm_squared());
+    // The best ridge of each channel; a negative share means that nothing is repeatable.
     let share = |(d, total): (usize, f64)| {
         let explained = held_out.iter().map(|left| 1.0 - left[d] / total);
         let best = explained.fold(0.0, f64::max);
@@ -75,10 +81,11 @@ pub(crate) fn repeatable_shares(
     totals.enumerate().map(share).collect()
 }
 
-/// Squared errors on folds that were not fitted, of each target, for each strength of the ridge.
+/// Squared errors on folds that were not fitted, `[ridge][target]`; strengths after one that fails are missing.
 type FoldErrors = Vec<Vec<f64>>;
 
-/// Errors by normal equations of the features. Inner products fold by fold; their sum less one fold is what the others say.
+/// Validation errors from normal equations of the features. Their matrices are computed per fold; the sum minus one
+/// fold belongs to the other folds.
 fn errors_by_features(
     features: &DMatrix<f64>,
     targets: &DMatrix<f64>,
@@ -86,6 +93,7 @@ fn errors_by_features(
 ) -> FoldErrors {
     let m = features.ncols();
     let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
+    // Products of the features with themselves and with the targets, fold by fold.
     let parts: Vec<[DMatrix<f64>; 2]> = (folds.iter())
         .map(|fold| {
             let own = rows(features, fold);
@@ -102,6 +110,7 @@ fn errors_by_features(
     let of_ridge = |ridge: &f64| {
         let mut left = vec![0.0; targets.ncols()];
         for (fold, [gram, right]) in folds.iter().zip(&parts) {
+            // Fit on all other folds.
             let mut others = &whole[0] - gram;
             for i in 0..m {
                 others[(i, i)] *= 1.0 + ridge;
@@ -119,8 +128,8 @@ fn errors_by_features(
     RIDGES.iter().map_while(of_ridge).collect()
 }
 
-/// The same where there are more features than samples: by inner products of the samples, which say the same of ridges
-/// (C. Saunders, A. Gammerman and V. Vovk, ICML 1998).
+/// The same if there are more features than samples: kernel ridge regression from inner products of the samples (C.
+/// Saunders, A. Gammerman and V. Vovk, ICML 1998).
 fn errors_by_samples(
     mut features: DMatrix<f64>,
     targets: &DMatrix<f64>,
@@ -137,6 +146,7 @@ fn errors_by_samples(
     let of_ridge = |ridge: &f64| {
         let mut left = vec![0.0; targets.ncols()];
         for fold in folds {
+            // Samples outside of the fold.
             let others: Vec<usize> = (0..n).filter(|i| !fold.contains(i)).collect();
             let mut own = products.select_rows(&others).select_columns(&others);
             for i in 0..others.len() {
@@ -152,30 +162,33 @@ fn errors_by_samples(
     RIDGES.iter().map_while(of_ridge).collect()
 }
 
+/// Adds the squared errors of a prediction to the sum of each target.
 fn add_errors(left: &mut [f64], said: DMatrix<f64>, target: &DMatrix<f64>) {
     for (left, column) in left.iter_mut().zip((target - said).column_iter()) {
         *left += column.norm_squared();
     }
 }
 
-/// How many products of two so many variables have.
+/// Number of products of two variables, squares included.
 fn feature_count(variables: usize) -> usize {
     variables * (variables + 1) / 2
 }
 
-/// Functions of the variables at some samples, each of unit size.
+/// Features: functions of the variables at some samples, `[feature][sample]`. Names that end with `_d` are rates, with
+/// `_dd` accelerations, others positions.
 fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec<f64>> {
     let mut scaled: Vec<Vec<f64>> = Vec::new();
     let (mut signs, mut shapes): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
     for (name, values) in variables {
         let values: Vec<f64> = picked.iter().map(|i| values[*i]).collect();
         let n = values.len() as f64;
+        // Scale each variable by its mean and standard deviation.
         let mean = values.iter().sum::<f64>() / n;
         let spread = (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt();
         if spread <= 0.0 || !spread.is_finite() {
             continue;
         }
-        // A sign that is no jump at its zero, so that noise of the rate does no harm.
+        // A sign that is smooth at zero, so that noise of the rate does no harm.
         if name.ends_with("_d") {
             let sign = |share: f64| {
                 values
@@ -183,10 +196,12 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
                     .map(|x| (x / (share * spread)).tanh())
                     .collect()
             };
+            // Two widths: nearly a jump, and a smooth transition.
             signs.push(sign(0.02));
             signs.push(sign(0.2));
         }
-        // Of positions also what only begins beyond a place, as stops do, and friction that remembers where it reversed.
+        // For positions also functions that begin beyond a place, as end stops do, and friction states that depend on
+        // earlier reversals.
         if !name.ends_with("_d") && !name.ends_with("_dd") {
             shapes.extend(hinges(&values, spread));
             let memories = MEMORIES
@@ -202,9 +217,11 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
     }
     let product =
         |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x * y).collect() };
+    // Signs and shapes alone, a constant, the variables, and their products.
     let mut features: Vec<Vec<f64>> = signs.iter().cloned().chain(shapes).collect();
     features.push(vec![1.0; picked.len()]);
     features.extend(scaled.iter().cloned());
+    // Products of up to three variables if there are few, else two.
     let degree = if scaled.len() <= 6 { 3 } else { 2 };
     for i in 0..scaled.len() {
         for j in i..scaled.len() {
@@ -223,8 +240,9 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
     features
 }
 
-/// How far a position is beyond some of its own quantiles, at both ends, in units of its spread.
+/// Distance of a position beyond some of its quantiles, at both ends, in units of its standard deviation.
 fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
+    // Quantiles from the sorted values.
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
@@ -250,7 +268,7 @@ fn dahl_state(values: &[f64], length: f64) -> Vec<f64> {
     let step = |x: &f64| {
         let moved = x - before;
         before = *x;
-        // Exact for a straight way between samples.
+        // Exact for a linear motion between samples.
         let bound = moved.signum();
         state = bound + (state - bound) * (-moved.abs() / length).exp();
         state
@@ -258,8 +276,8 @@ fn dahl_state(values: &[f64], length: f64) -> Vec<f64> {
     values.iter().map(step).collect()
 }
 
-/// The stretch of a spring that drags a block along a position, relative to the largest: the operator of which hysteresis that
-/// does not depend on the rate is made (L. Prandtl 1928, A. Ishlinskii 1944).
+/// Elongation of a spring that drags a block along a position, relative to its largest value: the stop operator, from
+/// which rate-independent hysteresis is composed (L. Prandtl 1928, A. Ishlinskii 1944).
 fn stop_operator(values: &[f64], width: f64) -> Vec<f64> {
     let mut block = values[0];
     let step = |x: &f64| {

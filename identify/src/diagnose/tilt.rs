@@ -1,8 +1,8 @@
-//! A base that does not stand level: gravity in its frame is turned, and forces are linear in gravity.
+//! A tilted base: gravity is rotated in its frame, and forces are linear in gravity.
 
 use super::column::ForceColumn;
 
-/// Angles below this are taken for none, rad.
+/// Smaller angles are treated as zero, rad.
 const STRAIGHT: f64 = 1e-9;
 
 /// A tilt of the base as a candidate; its parameters are angles, rad.
@@ -12,27 +12,28 @@ pub struct TiltCandidate {
     pub gravity: [f64; 3],
     /// The axis of each parameter: 0, 1, 2 for x, y, z.
     pub axes: Vec<usize>,
-    /// What forces change by with gravity along x, y and z, for each m/s^2.
+    /// Change of the forces with gravity along x, y and z, per m/s^2.
     pub components: [ForceSensitivity; 3],
 }
 
-/// What the forces change by with a number of the model.
+/// Change of the forces with one number of the model, per unit of that number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ForceSensitivity {
-    /// What every column of the base changes by, in their order.
+    /// Change of every column of the base, in their order.
     pub base: Vec<ForceColumn>,
-    /// What the forces of held parameters change by.
+    /// Change of the forces of fixed parameters.
     pub fixed: ForceColumn,
 }
 
 impl TiltCandidate {
-    /// Change of gravity for each radian of each parameter, between a level base and one at these angles: differences that
-    /// add up to the whole change, so that it is exact at the angles, or derivatives where these are zero.
+    /// Change of gravity per radian of each parameter, m/(s^2 rad), between a level base and one tilted by `angles`
+    /// (rad). Differences that add up to the complete change, so that the result is exact at the angles; derivatives
+    /// where an angle is zero.
     #[must_use]
     pub fn directions(&self, angles: &[f64]) -> Vec<[f64; 3]> {
         let mut directions = vec![[0.0; 3]; self.axes.len()];
         let mut now = self.gravity;
-        // Gravity turns back by Rz Ry Rx, first about z.
+        // The base is rotated by Rz Ry Rx, so gravity in its frame is rotated by the inverse, first about z.
         for axis in [2, 1, 0] {
             let Some(k) = self.axes.iter().position(|a| *a == axis) else {
                 continue;
@@ -49,7 +50,7 @@ impl TiltCandidate {
     }
 }
 
-/// A fixed vector seen from a frame that has turned about an axis.
+/// Coordinates of a fixed vector in a frame that has been rotated by an angle (rad) about an axis.
 fn rotate_vector(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
     let (sin, cos) = angle.sin_cos();
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -59,7 +60,7 @@ fn rotate_vector(vector: [f64; 3], axis: usize, angle: f64) -> [f64; 3] {
     turned
 }
 
-/// Its derivative where the frame has not turned.
+/// Their derivative with respect to the angle, at zero.
 fn rotation_derivative(vector: [f64; 3], axis: usize) -> [f64; 3] {
     let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
     let mut slope = [0.0; 3];
@@ -74,7 +75,8 @@ mod tests {
 
     use super::*;
 
-    /// Directions times angles are the whole change, by nalgebra's rotations; small angles agree with none.
+    /// Directions times angles are the complete change, compared with nalgebra's rotations; small angles agree with
+    /// zero.
     #[test]
     fn directions_add_up_to_gravity_that_turned() {
         let gravity = [1.0, -9.0, 3.0];

@@ -1,32 +1,35 @@
-//! What recordings leave open: effects whose columns are all but combinations of those that the model and the found set have, so
-//! that a force as large as the drive's own may be theirs or not. Neither a claim nor a denial is due to them; another motion
-//! tells. What is such a combination along any motion is none of them, since the model says it already.
+//! Effects that the recordings cannot decide: their columns are nearly combinations of those of the model and of the
+//! effects found, so that a force as large as the drive's own may or may not belong to them. They are neither claimed
+//! nor denied; another motion decides. Effects whose columns are such combinations along any motion are not listed,
+//! since the model already contains them.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::dot;
 use super::problem::{CandidateNature, ColumnSource, LocatedEffect};
+use super::thresholds::{UNDETERMINED_LEAST_SHARE, UNDETERMINED_MOST_VARIANCES};
 
-/// Samples that are looked at, at most.
+/// Largest number of samples that are used.
 const MOST: usize = 2000;
-/// Shares of squares below this are rounding: the column is a combination of others along any motion.
-const ROUNDING: f64 = 1e-18;
 
 impl EffectSelector<'_> {
-    /// Effects that may hide beside a set, which leaves `rest`.
+    /// Effects that a set with the residual `rest` cannot decide. Only effects with one choice of columns at one place
+    /// are considered.
     pub(crate) fn find_undetermined(
         &self,
         picks: &[SelectedEffect],
         rest: &[Vec<f64>],
     ) -> Vec<LocatedEffect> {
+        // Use every n-th sample if there are many.
         let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
+        // Orthonormal basis of the columns of model and set (Gram-Schmidt); dependent columns are skipped.
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for k in self.columns(picks) {
             let column = self.stacked_column(k, every);
             let left = project_out(&basis, &column);
             let size = left.norm();
-            if size * size > ROUNDING * column.norm_squared() {
+            if size * size > UNDETERMINED_LEAST_SHARE * column.norm_squared() {
                 basis.push(left / size);
             }
         }
@@ -35,6 +38,7 @@ impl EffectSelector<'_> {
             let ColumnSource::Columns(choices) = &candidate.source else {
                 continue;
             };
+            // The same kind at the same place counts as found.
             let is_found = picks.iter().any(|pick| {
                 let effect = &self.candidate(pick).effect;
                 pick.candidate == k
@@ -51,10 +55,12 @@ impl EffectSelector<'_> {
                 .iter()
                 .map(|k| self.stacked_column(*k, every))
                 .collect();
+            // Share of the effect that the model and the set do not contain.
             let Some(share) = least_share(&basis, &columns) else {
                 continue;
             };
             let channels = self.affected_channels(&[pick]);
+            // Mean square of the drives' forces relative to the residual.
             let force: f64 = channels
                 .iter()
                 .map(|d| {
@@ -62,15 +68,20 @@ impl EffectSelector<'_> {
                     self.weights[*d] * dot(&force, &force) / force.len().max(1) as f64
                 })
                 .sum();
-            // The deviation of its own force, in units of what is left, against the force of the drives.
-            if share > ROUNDING && self.effective_equations(rest, &channels) * share * force < 1.0 {
+            // Undecidable if the uncertainty of its force exceeds the force of the drives. The weights make both
+            // relative to the residual.
+            if share > UNDETERMINED_LEAST_SHARE
+                && self.effective_equations(rest, &channels) * share * force
+                    < UNDETERMINED_MOST_VARIANCES
+            {
                 untold.push(candidate.effect.clone());
             }
         }
         untold
     }
 
-    /// A column of the pool along some samples, channels one after the other, each in units of what is left of it.
+    /// Every `every`-th sample of a column, channels one after the other, each divided by the standard deviation of its
+    /// residual.
     fn stacked_column(&self, column: usize, every: usize) -> DVector<f64> {
         let n = self.pool.all_samples().len();
         let channels = self.pool.column(column).0.iter().zip(&self.weights);
@@ -82,7 +93,7 @@ impl EffectSelector<'_> {
     }
 }
 
-/// What orthonormal directions leave of a column; twice, so that rounding of the first time goes too.
+/// Projects orthonormal directions out of a column; twice, to remove rounding errors of the first pass.
 fn project_out(basis: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
     let mut left = column.clone();
     for _ in 0..2 {
@@ -94,9 +105,10 @@ fn project_out(basis: &[DVector<f64>], column: &DVector<f64>) -> DVector<f64> {
     left
 }
 
-/// The least share of squares that directions leave of any combination of some columns but for those that they say along any
-/// motion; `None` where they say all.
+/// Least share of squares that remains after the projection, over all combinations of some columns. Combinations that
+/// are determined along any motion are skipped; `None` if all are.
 fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> {
+    // Scale the columns, so that units do not matter.
     let scaled: Vec<DVector<f64>> = (columns.iter())
         .filter(|column| column.norm() > 0.0)
         .map(|column| column / column.norm())
@@ -104,10 +116,12 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     if scaled.is_empty() {
         return None;
     }
+    // An orthonormal basis of the columns themselves.
     let own = DMatrix::from_columns(&scaled);
     let svd = own.svd(true, false);
     let u = svd.u?;
     let largest = svd.singular_values.max();
+    // Independent directions of the columns.
     let kept = (0..u.ncols()).filter(|k| svd.singular_values[*k] > 1e-6 * largest);
     let left: Vec<DVector<f64>> = kept
         .map(|k| project_out(basis, &u.column(k).into_owned()))
@@ -117,7 +131,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let squares = shares
         .iter()
         .map(|s| s * s)
-        .filter(|share| *share > ROUNDING);
+        .filter(|share| *share > UNDETERMINED_LEAST_SHARE);
     squares.min_by(f64::total_cmp)
 }
 
@@ -125,8 +139,8 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
 mod tests {
     use super::*;
 
-    /// Beside sine and cosine a sum of both says nothing, the same with a little of another wave says that little, and another
-    /// wave says all.
+    /// In addition to sine and cosine, a sum of both contains nothing new; with a small part of another wave it
+    /// contains that part; another wave is new completely.
     #[test]
     fn what_is_left_of_columns_is_their_own() {
         let wave = |k: f64, phase: f64| {

@@ -1,10 +1,10 @@
-//! Standard deviations that allow for autocorrelated residuals: a solution and a second showing
-//! of its rows go in, the covariance of the parameters comes out.
+//! Standard deviations that allow for autocorrelated residuals. Input: a solution and a second pass over its rows;
+//! output: the covariance of the parameters.
 //!
-//! The residual of an identified mechanism is mostly what the model lacks, not white noise, so
-//! neighbouring samples repeat each other and the classical formula promises far too much.
-//! Each sample's influence on the parameters is `u_t = (W'W)^-1 sum_channels w_tc e_tc`, and
-//! the covariance of their sum is estimated from all `E[u_t u_(t+l)']`:
+//! The residual of an identified mechanism is mostly model error and not white noise. Neighbouring samples are
+//! therefore correlated, and the classical formula gives far too small standard deviations. Each sample's influence on
+//! the parameters is `u_t = (W'W)^-1 sum_channels w_tc e_tc`, and the covariance of their sum is estimated from all
+//! `E[u_t u_(t+l)']`:
 //!
 //! 1. Prewhitening of each parameter's influence by its own AR(1) coefficient `a`, at most 0.97
 //!    in size: D. W. K. Andrews and J. C. Monahan, Econometrica 60 (1992).
@@ -16,13 +16,13 @@
 //!    weights; never below `n + 1`, and never above a tenth of the samples.
 //! 4. Recolouring by `1/(1 - a)` and the factor `T/(T - n_parameters)`.
 //!
-//! All this is a limit of many samples: residuals of a fit are orthogonal to its columns, so with few of them their
-//! influences cancel and the estimate goes to nothing. [`Deviations::few_samples`] says when; then a deviation is never
-//! below the classical one, which takes the degrees of freedom off exactly.
+//! This is valid for many samples. Residuals of a fit are orthogonal to its columns, so with few samples their
+//! influences cancel and the estimate approaches zero. [`ParameterUncertainty::few_samples`] shows this case; then a
+//! standard deviation is never below the classical one, which uses the exact degrees of freedom.
 //!
-//! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of
-//! `S_t S_t'/L`, `S_t` being the sum of the window: the same number, at a cost and a memory
-//! that do not grow with the lags times the parameters squared.
+//! Bartlett's sum over lags is computed as the sum over all windows of `L` samples of `S_t S_t'/L`, where `S_t` is the
+//! sum of the window: the same number, at a cost and a memory that do not grow with the lags times the parameters
+//! squared.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -30,47 +30,44 @@ use crate::estimate::error::LeastSquaresError;
 use crate::estimate::lags::{BartlettWindows, LagProducts, bandwidth, lags_for_bandwidth};
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::FEWEST_ROWS;
 
 /// Uncertainty of a solution. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterUncertainty {
-    /// Standard deviations; infinite for parameters that are not determined, NaN where there are no more rows than
-    /// parameters, for then residuals are rounding and say nothing.
+    /// Standard deviations; infinite for parameters that are not determined. NaN if there are no more rows than
+    /// parameters, since residuals are then rounding.
     pub std: Vec<f64>,
-    /// Covariance of the parameters; where a parameter is not determined, only of the part that is.
+    /// Covariance of the parameters; for an undetermined parameter only of the determined part.
     pub covariance: DMatrix<f64>,
-    /// For each parameter, how many independent samples would give the same deviation under the
+    /// For each parameter, the number of independent samples that would give the same standard deviation by the
     /// classical formula: `samples * (classical / std)^2`.
     pub effective_samples: Vec<f64>,
-    /// Correlation of each channel's residual with itself one sample later.
+    /// Correlation of each channel's residual with itself one sample later, `[channel]`.
     pub residual_lag1: Vec<f64>,
     /// Bandwidth of Bartlett's kernel, samples.
     pub bandwidth: usize,
-    /// Samples, each of all channels; rows of zeros do not count.
+    /// Number of samples, each of all channels; rows of zeros do not count.
     pub samples: usize,
-    /// True where there are fewer than [`FEWEST_ROWS`] equations for each parameter: the deviations are then no smaller
-    /// than the classical ones, and still too small if neighbouring residuals resemble each other.
+    /// True if there are fewer than [`FEWEST_ROWS`] equations for each parameter. The standard deviations are then at
+    /// least the classical ones, and still too small if neighbouring residuals are correlated.
     pub few_samples: bool,
 }
 
-/// Equations for each parameter below which the influences of samples cancel too much to be summed over lags.
-pub const FEWEST_ROWS: usize = 20;
-
-/// Standard deviations of `solution`, whose rows `show` presents again, block by block and in
-/// order of time; it is called twice.
+/// Standard deviations of `solution`. `show` presents its rows again, block by block and in order of time; it is called
+/// twice.
 ///
-/// Several recordings may be shown one after the other: the few products across the seams do
-/// not matter.
-/// Fails when `show` fails, or shows other rows than the solution was made from.
+/// Several recordings may be shown one after the other: the few products across their borders do not matter.
+/// Fails if `show` fails, or shows other rows than those of the solution.
 ///
 /// ```
-/// use modelmill_identify::{LeastSquares, LeastSquaresError, estimate::autocorrelated_deviations};
+/// use modelmill_identify::{LeastSquares, LeastSquaresError, estimate::uncertainty_with_autocorrelation};
 /// let regressor: Vec<f64> = (0..400).flat_map(|i| [1.0, f64::from(i)]).collect();
 /// let measured: Vec<f64> = (0..400).map(|i| 3.0 + 2.0 * f64::from(i) + f64::from(i % 7)).collect();
 /// let mut regression = LeastSquares::new(2);
 /// regression.add_rows(&regressor, &measured)?;
 /// let solution = regression.solve()?;
-/// let deviations = autocorrelated_deviations(&solution, 1, |visit| visit(&regressor, &measured))?;
+/// let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&regressor, &measured))?;
 /// assert!(deviations.std[1] < 1e-2);
 /// # Ok::<(), LeastSquaresError>(())
 /// ```
@@ -85,10 +82,10 @@ pub fn uncertainty_with_autocorrelation<E: From<LeastSquaresError>>(
     })
 }
 
-/// Takes each sample's influence on the parameters and its residuals.
+/// Receives each sample's influence on the parameters and its residuals.
 pub(crate) type InfluenceSink<'a> = dyn FnMut(&[f64], &[f64]) + 'a;
 
-/// Deviations from a showing of each sample's influence, which is made twice.
+/// Standard deviations from each sample's influence; `run` presents the influences and is called twice.
 pub(crate) fn from_influences<E>(
     solution: &RegressionSolution,
     channels: usize,
@@ -96,7 +93,7 @@ pub(crate) fn from_influences<E>(
 ) -> Result<ParameterUncertainty, E> {
     let n = solution.values.len();
     let channels = channels.max(1);
-    // Lags are counted in time, which goes on where rows are left out; what the rows are worth is not.
+    // Lags are counted in time, including rows that are left out; the number of samples excludes these.
     let samples = solution.rows.div_ceil(channels);
     let steps = solution.shown / channels;
     let lags = lags_for_bandwidth(steps);
@@ -107,6 +104,7 @@ pub(crate) fn from_influences<E>(
         residuals.push(errors);
     })?;
 
+    // Second pass: prewhitened influences, summed with Bartlett's kernel.
     let whitening: Vec<f64> = (0..n)
         .map(|j| memory.correlation(1, j).clamp(-0.97, 0.97))
         .collect();
@@ -130,6 +128,7 @@ pub(crate) fn from_influences<E>(
         windows.push(&white);
     })?;
 
+    // Recolour, and correct for the degrees of freedom.
     let freedom = samples.saturating_sub(n.div_ceil(channels)).max(1);
     let correction = samples as f64 / freedom as f64;
     let sum = windows.finish();
@@ -156,7 +155,7 @@ pub(crate) fn from_influences<E>(
         .zip(&solution.classical_std)
         .map(|(std, classical)| {
             if std.is_finite() {
-                // Residuals that alternate make deviations smaller than independent ones, but no more samples.
+                // Residuals that alternate in sign reduce the standard deviation, but do not add samples.
                 samples as f64 * (classical / std).powi(2).min(1.0)
             } else {
                 0.0
@@ -176,7 +175,7 @@ pub(crate) fn from_influences<E>(
     })
 }
 
-/// Raises variances that lie below the classical ones up to them; correlations stay.
+/// Raises variances that are below the classical ones; correlations stay.
 fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &RegressionSolution) {
     for i in 0..solution.values.len() {
         let classical = solution.classical_std[i].powi(2);
@@ -195,7 +194,7 @@ fn raise_to_classical(covariance: &mut DMatrix<f64>, solution: &RegressionSoluti
     }
 }
 
-/// Shows each sample's influence on the parameters and its residuals.
+/// Computes each sample's influence on the parameters and its residuals.
 struct InfluenceScores<'a> {
     solution: &'a RegressionSolution,
     channels: usize,
@@ -206,6 +205,7 @@ impl<'a> InfluenceScores<'a> {
         Self { solution, channels }
     }
 
+    /// Passes influence and residuals of every sample to `take`; fails if the rows differ from those of the solution.
     fn show_influences<E: From<LeastSquaresError>>(
         &mut self,
         show: &mut impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
@@ -230,6 +230,7 @@ impl<'a> InfluenceScores<'a> {
                 .chunks_exact(n * self.channels)
                 .zip(measured.chunks_exact(self.channels));
             for (sample, measured) in samples {
+                // Gradient of the sample: its rows times their residuals, summed over the channels.
                 gradient.fill(0.0);
                 for (channel, row) in sample.chunks_exact(n).enumerate() {
                     let model: f64 = row
@@ -266,7 +267,7 @@ mod tests {
     use crate::LeastSquares;
     use crate::test_noise::TestNoise;
 
-    /// As many rows as parameters leave residuals of rounding, from which nothing can be said.
+    /// With as many rows as parameters, residuals are rounding and contain no information.
     #[test]
     fn without_a_row_to_spare_there_is_no_deviation() {
         let (w, y) = ([1.0, 0.0, 1.0, 1.0], [1.0, 3.0]);
@@ -278,8 +279,9 @@ mod tests {
         assert!(found.unwrap().std.iter().all(|std| std.is_nan()));
     }
 
-    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows Student's
-    /// distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table of t).
+    /// The classical deviation is exact for independent residuals, however few: `(y - W p) / std` then follows
+    /// Student's distribution, whose 2-sigma coverage for two degrees of freedom is 81.6 %, for eight 91.9 % (any table
+    /// of t).
     #[test]
     fn few_samples_cover_as_students_distribution_says() {
         for (samples, expected) in [(4, 0.816), (10, 0.919)] {
@@ -334,7 +336,7 @@ mod tests {
         }
     }
 
-    /// How often `|estimate - truth| <= 2 std` holds, by the honest and by the classical formula.
+    /// How often `|estimate - truth| <= 2 std` is true, by the autocorrelated and by the classical formula.
     fn coverage(correlation: f64, channels: usize) -> ([f64; 3], [f64; 3]) {
         let (trials, samples) = (400, 1500);
         let truth = [4.0, -2.0, 1.0];

@@ -1,14 +1,13 @@
-//! Instrumental variables, for states that are noisy themselves: rows of instruments beside rows
-//! of the regressor go in, a solution without the bias of least squares comes out.
+//! Instrumental variables, for noisy states. Input: rows of instruments and of the regressor; output: a solution
+//! without the bias of least squares.
 //!
-//! In a closed loop the noise of the encoders runs through the controller into the forces, and the
-//! regressor is made from the same noisy states; least squares then misses the truth however long
-//! the recording. The remedy is a second regressor `Z` whose errors have nothing to do with those
-//! of the forces, `p = (Z'W)^-1 Z'y`: from the reference motion that the robot was told to follow,
-//! or from another period of the same motion. Source: A. Janot, P.-O. Vandanjon and M. Gautier,
-//! "A generic instrumental variable approach for industrial robot identification", IEEE Trans.
-//! CST 22 (2014), who make `Z` by simulating the closed loop, which needs its controller; P. C.
-//! Young, "Recursive Estimation and Time-Series Analysis" (2011), chapter 6.
+//! In a closed loop the noise of the encoders passes through the controller into the forces, and the regressor is
+//! computed from the same noisy states. Least squares is then biased, however long the recording is. The remedy is a
+//! second regressor `Z` whose errors are independent of those of the forces, `p = (Z'W)^-1 Z'y`: from the reference
+//! motion of the robot, or from another period of the same motion. Source: A. Janot, P.-O. Vandanjon and M. Gautier, "A
+//! generic instrumental variable approach for industrial robot identification", IEEE Trans. CST 22 (2014), who compute
+//! `Z` by simulating the closed loop, which needs its controller; P. C. Young, "Recursive Estimation and Time-Series
+//! Analysis" (2011), chapter 6.
 //!
 //! The stacked rows `[Z W y]` are reduced by reflections as in [`LeastSquares`](crate::LeastSquares); with
 //! `Q'Z = R`, `Q'W = B` and `Q'y = b` the solution is `B^-1 b`, and no products of rows are formed.
@@ -20,27 +19,25 @@ use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
 use crate::estimate::rows::{RowVisitor, check_rows};
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::INSTRUMENT_LEAST_CORRELATION;
 
-/// Canonical correlations below this say nothing.
-const MIN_CORRELATION: f64 = 1e-6;
-
-/// What instruments make of a recording.
+/// Result of an estimate with instruments.
 #[derive(Debug, Clone)]
 pub struct InstrumentalEstimate {
     /// The solution.
     pub solution: RegressionSolution,
-    /// Its deviations, which allow for autocorrelation.
+    /// Its standard deviations, which allow for autocorrelation.
     pub uncertainty: ParameterUncertainty,
-    /// What least squares finds on the same rows.
+    /// Least squares solution of the same rows.
     pub least_squares: RegressionSolution,
-    /// The smallest canonical correlation between instruments and regressor, 0 to 1: near 1 they say as much as the
-    /// regressor itself, below 0.2 little.
+    /// Smallest canonical correlation between instruments and regressor, 0 to 1: near 1 the instruments are as
+    /// informative as the regressor, below 0.2 they are weak.
     pub strength: f64,
 }
 
-/// Estimates `n` parameters; `show` presents rows of `2 n` numbers, instruments first, interleaved per sample, in order of
-/// time, the same in each of three showings.
-/// Fails when `show` fails, a number is not finite, or the instruments do not determine the parameters.
+/// Estimates `n` parameters. `show` presents rows of `2 n` numbers, instruments first, interleaved per sample, in order
+/// of time, and the same in each of three passes.
+/// Fails if `show` fails, a number is not finite, or the instruments do not determine the parameters.
 pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
     n: usize,
     channels: usize,
@@ -105,14 +102,16 @@ pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
     })
 }
 
+/// Solution from the R factor of instruments and regressor.
 struct InstrumentalSolution {
     solution: RegressionSolution,
     least_squares: RegressionSolution,
     strength: f64,
-    /// `(Z'W)^-1`
+    /// `(Z'W)^-1`, from gradients to parameters.
     to_parameters: DMatrix<f64>,
 }
 
+/// Solves for `n` parameters; fails if the instruments are too weak.
 fn solve_instrumental(
     regression: &LeastSquares,
     n: usize,
@@ -123,7 +122,7 @@ fn solve_instrumental(
     let r_z = DMatrix::from_fn(n, n, &entry);
     let b = DMatrix::from_fn(n, n, |i, j| entry(i, n + j));
     let right = DVector::from_fn(n, |i, _| entry(i, 2 * n));
-    // The rows of W and y alone: what least squares would see.
+    // Rows of W and y alone, for ordinary least squares.
     let mut plain = LeastSquares::new(n);
     for row in triangle.chunks_exact(width) {
         plain.add_rows(&row[n..2 * n], &row[2 * n..])?;
@@ -143,7 +142,7 @@ fn solve_instrumental(
     let b_inverse = b
         .clone()
         .try_inverse()
-        .filter(|_| strength > MIN_CORRELATION)
+        .filter(|_| strength > INSTRUMENT_LEAST_CORRELATION)
         .ok_or(weak(strength))?;
     let r_inverse = r_z
         .solve_upper_triangular(&DMatrix::identity(n, n))
@@ -176,8 +175,8 @@ mod tests {
 
     type Rows = (Vec<f64>, Vec<f64>);
 
-    /// A spring and a constant force on a coordinate whose encoder is noisy; the force follows the noisy coordinate through
-    /// a controller, so that both errors are the same. Instruments: the coordinate that was asked for.
+    /// A spring and a constant force on a coordinate whose encoder is noisy. The force follows the noisy coordinate
+    /// through a controller, so that both errors are the same. Instruments: the reference coordinate.
     fn rows(seed: u64, samples: i32) -> Rows {
         let mut noise = TestNoise::new(seed);
         let (mut rows, mut y) = (Vec::new(), Vec::new());

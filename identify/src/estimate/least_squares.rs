@@ -1,14 +1,12 @@
 //! Least squares, eq. (12) of the paper: `p_min = argmin |W p - y|`, from a stream of rows.
 //!
-//! Rows go in block by block and are reduced at once by Householder reflections to the upper
-//! triangle `[R | Q'y]` with the residual norm in its corner, so the memory needed does not
-//! depend on the number of samples and the normal equations, which would square the condition
-//! number, are never formed. Rows of one channel are reduced together: the force of a joint does
-//! not depend on the links before it, and columns that are zero in a whole block cost nothing.
-//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer.
-//! Math. 7 (1965); J. Demmel et al., "Communication-optimal parallel and sequential QR and LU
-//! factorizations", SIAM J. Sci. Comput. 34 (2012) for the sequential tall-skinny form;
-//! A. van der Sluis (1969) for scaling columns to equal norm.
+//! Rows are added block by block and reduced at once by Householder reflections to the upper triangle `[R | Q'y]` with
+//! the residual norm in its corner. So the memory does not depend on the number of samples, and the normal equations,
+//! which would square the condition number, are never formed. Rows of one channel are reduced together: the force of a
+//! joint does not depend on the links before it, and columns that are zero in a complete block cost nothing.
+//! Sources: G. H. Golub, "Numerical methods for solving linear least squares problems", Numer. Math. 7 (1965); J.
+//! Demmel et al., "Communication-optimal parallel and sequential QR and LU factorizations", SIAM J. Sci. Comput. 34
+//! (2012) for the sequential tall-skinny form; A. van der Sluis (1969) for scaling columns to equal norm.
 
 use nalgebra::DMatrix;
 
@@ -17,10 +15,10 @@ use crate::estimate::reflections::{HouseholderBlock, LANES, fold_into_factor};
 use crate::estimate::rows::{all_finite, check_rows, is_uninformative};
 use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
-/// Numbers that are reduced together at most, so that they stay in the fastest caches.
+/// Largest number of values that are reduced together, so that they fit into the fastest caches.
 const BLOCK_NUMBERS: usize = 4096;
 
-/// Rows that are reduced together for that many columns.
+/// Number of rows that are reduced together for a number of columns.
 fn block_rows(width: usize) -> usize {
     (BLOCK_NUMBERS / width)
         .clamp(64, 512)
@@ -42,17 +40,17 @@ fn block_rows(width: usize) -> usize {
 pub struct LeastSquares {
     n_parameters: usize,
     rows: usize,
-    /// Rows of zeros among them.
+    /// Number of rows of zeros among them.
     zero_rows: usize,
     /// `(n + 1) x (n + 1)`, row-major upper triangle `[R, Q'y; 0, +-|residual|]`.
     augmented_factor: Vec<f64>,
     /// Rows per block.
     block_rows: usize,
-    /// For each channel a block of rows.
+    /// A block of pending rows for each channel.
     channels: Vec<PendingRows>,
 }
 
-/// Rows that wait to be reduced: `n + 1` columns of `block_rows`, filled up to `rows`.
+/// Pending rows: `n + 1` columns of `block_rows` values, filled up to `rows`.
 #[derive(Debug, Clone)]
 struct PendingRows {
     block: Vec<f64>,
@@ -65,8 +63,8 @@ impl LeastSquares {
         Self::with_channels(n_parameters, 1)
     }
 
-    /// The same for rows that take turns between channels (`row = sample * channels + channel`): those of one channel are
-    /// reduced together, which saves work where a channel does not depend on all parameters. The result is the same.
+    /// The same for rows that are interleaved by channel (`row = sample * channels + channel`). Those of one channel
+    /// are reduced together, which saves work if a channel does not depend on all parameters. The result is the same.
     pub fn with_channels(n_parameters: usize, channels: usize) -> Self {
         let width = n_parameters + 1;
         let block_rows = block_rows(width);
@@ -89,11 +87,12 @@ impl LeastSquares {
         self.n_parameters
     }
 
-    /// Rows taken so far.
+    /// Number of rows so far.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
+    /// Number of all rows, and of those that are not zero.
     pub(crate) fn row_count(&self) -> RowCount {
         RowCount {
             shown: self.rows,
@@ -101,9 +100,9 @@ impl LeastSquares {
         }
     }
 
-    /// Takes rows: `regressor[row * n_parameters + column]` and `measured[row]`.
-    /// To weigh a row, scale it and its measured value.
-    /// Fails when the lengths do not fit or a number is not finite; nothing is taken then.
+    /// Adds rows: `regressor[row * n_parameters + column]` and `measured[row]`.
+    /// To weight a row, scale it and its measured value.
+    /// Fails if the lengths do not match or a number is not finite; then nothing is added.
     pub fn add_rows(
         &mut self,
         regressor: &[f64],
@@ -129,8 +128,8 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Takes rows of one channel, column by column: the fastest way in. All columns are as long as `measured`.
-    /// Fails as [`LeastSquares::add_rows`] does; nothing is taken then.
+    /// Adds rows of one channel, column by column, which is the fastest way. All columns have the length of `measured`.
+    /// Fails as [`LeastSquares::add_rows`] does; then nothing is added.
     ///
     /// ```
     /// use modelmill_identify::LeastSquares;
@@ -171,7 +170,7 @@ impl LeastSquares {
                 });
             }
         }
-        // Few measured values are zero, so that this costs next to nothing.
+        // Few measured values are zero, so this test costs little.
         let silent = measured.iter().enumerate().filter(|(_, y)| **y == 0.0);
         self.zero_rows += silent
             .filter(|(i, _)| columns.iter().all(|column| column[*i] == 0.0))
@@ -196,8 +195,8 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Folds in another regression for the same parameters, e.g. one that ran on another core.
-    /// Fails when the numbers of parameters differ.
+    /// Merges another regression for the same parameters, for example one that ran on another core. Fails if the
+    /// numbers of parameters differ.
     pub fn merge(&mut self, mut other: Self) -> Result<(), LeastSquaresError> {
         let n = self.n_parameters;
         if other.n_parameters != n {
@@ -215,7 +214,7 @@ impl LeastSquares {
         Ok(())
     }
 
-    /// Folds the pending rows of a channel into the triangle.
+    /// Reduces the pending rows of a channel into the R factor.
     fn reduce_block(&mut self, channel: usize) {
         let (stride, pending) = (self.block_rows, &mut self.channels[channel]);
         let rows = pending.rows.next_multiple_of(LANES);
@@ -231,37 +230,36 @@ impl LeastSquares {
         pending.rows = 0;
     }
 
-    /// Folds all pending rows into the triangle.
+    /// Reduces all pending rows into the R factor.
     fn reduce(&mut self) {
         for channel in 0..self.channels.len() {
             self.reduce_block(channel);
         }
     }
 
-    /// The whole triangle `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
+    /// The complete factor `[R, Q'y; 0, +-|residual|]`, `(n + 1) x (n + 1)` by rows.
     pub(crate) fn augmented_factor(&self) -> Vec<f64> {
         let mut complete = self.clone();
         complete.reduce();
         complete.augmented_factor
     }
 
-    /// The triangle `R` of the regressor, `n x n`: same singular values, same column norms and
-    /// same dependencies as the stacked regressor.
+    /// The R factor of the regressor, `n x n`: it has the same singular values, column norms and dependencies as the
+    /// stacked regressor.
     pub fn r_factor(&self) -> DMatrix<f64> {
         let (n, triangle) = (self.n_parameters, self.augmented_factor());
         DMatrix::from_fn(n, n, |i, j| triangle[i * (n + 1) + j])
     }
 
-    /// The least-squares solution. Where the rows do not determine all parameters, the
-    /// undetermined directions keep the value 0 (in columns of equal norm: the shortest
-    /// solution), and [`Solution::undetermined`] names them.
-    /// Fails when there are no rows or no parameters.
+    /// The least squares solution. If the rows do not determine all parameters, the undetermined directions keep the
+    /// value 0 (in columns of equal norm: the shortest solution), and [`RegressionSolution::undetermined`] lists them.
+    /// Fails if there are no rows or no parameters.
     pub fn solve(&self) -> Result<RegressionSolution, LeastSquaresError> {
         self.solve_near(&vec![0.0; self.n_parameters])
     }
 
-    /// [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined
-    /// parameters do not depend on `nominal`.
+    /// As [`LeastSquares::solve`], but undetermined directions stay at `nominal`. Determined parameters do not depend
+    /// on `nominal`.
     pub fn solve_near(&self, nominal: &[f64]) -> Result<RegressionSolution, LeastSquaresError> {
         let n = self.n_parameters;
         if n == 0 {
@@ -348,7 +346,8 @@ mod tests {
         near(halves.solve().unwrap().values[3], dense[3], 1e-11);
     }
 
-    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by columns.
+    /// Rows of three channels, of which the later ones do not see the first columns: by rows, by channels and by
+    /// columns.
     #[test]
     fn channels_and_columns_reduce_to_the_same_triangle() {
         let mut noise = TestNoise::new(6);
@@ -432,7 +431,7 @@ mod tests {
         for i in 0..200 {
             let t = f64::from(i);
             let (a, b) = ((0.1 * t).sin(), (0.23 * t).cos());
-            // Columns: a, b, 2 a - or so they say - and nothing at all.
+            // Columns: a, b, 2 a, and zeros.
             regression
                 .add_rows(&[a, b, 2.0 * a, 0.0], &[7.0 * a + 5.0 * b])
                 .unwrap();

@@ -1,13 +1,14 @@
-//! Medians of streams: magnitudes go in one by one, their median comes out to three digits, in a
-//! memory that does not grow.
+//! Medians of streams. Input: magnitudes one by one; output: their median to three digits, in constant memory.
 
-/// Bits of a magnitude that tell its bin: exponent and six bits behind it, 64 bins for each octave.
+/// Bits of a magnitude that select its bin: the exponent and six more bits, 64 bins per octave.
 const BITS: u32 = 17;
 
-/// Counts of magnitudes in bins of equal ratio.
+/// Counts of magnitudes in bins with a constant ratio of width to value.
 #[derive(Debug, Clone)]
 pub(crate) struct MagnitudeHistogram {
+    /// Count of each bin.
     counts: Vec<u64>,
+    /// Count of all magnitudes.
     total: u64,
 }
 
@@ -19,13 +20,13 @@ impl MagnitudeHistogram {
         }
     }
 
-    /// Counts a magnitude, which is finite and not negative.
+    /// Adds a magnitude, which is finite and not negative.
     pub(crate) fn add(&mut self, magnitude: f64) {
         self.counts[bin_of_magnitude(magnitude)] += 1;
         self.total += 1;
     }
 
-    /// The median, interpolated inside its bin; 0 for nothing.
+    /// The median, interpolated within its bin; 0 without magnitudes.
     pub(crate) fn median(&self) -> f64 {
         let half = self.total as f64 / 2.0;
         let mut before = 0.0;
@@ -46,12 +47,14 @@ impl MagnitudeHistogram {
     }
 }
 
+/// Bin of a magnitude.
 #[allow(clippy::cast_possible_truncation, reason = "18 bits at most")]
 fn bin_of_magnitude(magnitude: f64) -> usize {
     // The sign bit of a magnitude is zero.
     ((magnitude.to_bits() & (u64::MAX >> 1)) >> (63 - BITS)) as usize
 }
 
+/// Lower edge of a bin.
 fn bin_edge(bin: usize) -> f64 {
     f64::from_bits((bin as u64) << (63 - BITS))
 }

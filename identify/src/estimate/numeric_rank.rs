@@ -1,6 +1,5 @@
-//! Rank of a regressor on given values, eq. (9) of the paper, and the reduction that pivoted QR
-//! offers on them. Numeric throughout: valid for these values and these samples, to rounding;
-//! the exact reduction is another matter and another crate.
+//! Rank of a regressor at given values, eq. (9) of the paper, and the reduction by QR with column pivoting. Both are
+//! numeric: valid for these values and samples, up to rounding. The exact reduction is in another crate.
 //!
 //! Sources: G. H. Golub and C. F. Van Loan, "Matrix Computations", 5.5; M. Gautier, "Numerical
 //! calculation of the base inertial parameters of robots", J. Robotic Systems 8 (1991).
@@ -9,26 +8,25 @@ use nalgebra::{ColPivQR, DMatrix};
 use serde::{Deserialize, Serialize};
 
 use crate::estimate::error::LeastSquaresError;
+use crate::estimate::thresholds::NOISE_COLUMN_TOLERANCE;
 
 /// Rank of a regressor by its singular values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegressorRank {
-    /// Singular values of the regressor with all columns scaled to norm 1, largest first;
-    /// columns that are zero throughout add zeros.
+    /// Singular values of the regressor with all columns scaled to norm 1, largest first; columns of zeros add zeros.
     pub singular_values: Vec<f64>,
-    /// How many of them stand above the largest gap.
+    /// Number of singular values above the largest gap.
     pub rank: usize,
-    /// Ratio of the last singular value that counts to the first that does not (or to the level
-    /// of rounding, when that is higher or all count). Below some 1e3 the rank is a matter of
-    /// opinion.
+    /// Ratio of the last singular value that counts to the first that does not (or to the level of rounding, if that is
+    /// higher or all count). Below about 1e3 the rank is uncertain.
     pub gap: f64,
-    /// Ratio of the first singular value to the last one that counts, of the scaled columns.
+    /// Ratio of the largest singular value to the last one that counts, of the scaled columns.
     pub scaled_condition_number: f64,
     /// The same for the regressor as it is, in its units.
     pub condition_number: f64,
 }
 
-/// A numeric reduction: columns that are kept, and the others as combinations of them.
+/// A numeric reduction: columns that are kept, and the others as linear combinations of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NumericReduction {
     /// Columns kept, in ascending order; as many as the rank.
@@ -48,12 +46,11 @@ pub struct NumericDependency {
     pub factors: Vec<(usize, f64)>,
 }
 
-/// The numeric rank of a stacked regressor, or of the triangle
-/// [`LeastSquares::triangle`](crate::LeastSquares::triangle) that stands for it.
+/// The numeric rank of a stacked regressor, or of its [`LeastSquares::r_factor`](crate::LeastSquares::r_factor).
 ///
-/// The rank is where the singular values of the scaled columns fall by the largest ratio; values
-/// below the level of rounding, `max(rows, columns) * epsilon * largest`, are taken as being at it.
-/// Fails when an entry is not finite or there are no columns.
+/// The rank is where the singular values of the scaled columns decrease by the largest ratio. Values below the level of
+/// rounding, `max(rows, columns) * epsilon * largest`, are treated as equal to it.
+/// Fails if an entry is not finite or there are no columns.
 pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError> {
     let (scaled, _) = scale(w)?;
     let singular_values = singular_values(&scaled)?;
@@ -87,11 +84,11 @@ pub fn numeric_rank(w: &DMatrix<f64>) -> Result<RegressorRank, LeastSquaresError
     })
 }
 
-/// Ratio of the largest to the least singular value of a matrix as it is, in its units; `None` where the least one is at
-/// the level of rounding, so that the columns depend on each other.
-/// Fails when an entry is not finite or there are no columns.
+/// Ratio of the largest to the smallest singular value of a matrix in its units; `None` if the smallest is at the level
+/// of rounding, so that columns are dependent.
+/// Fails if an entry is not finite or there are no columns.
 pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresError> {
-    // Columns of unlike units are no sign of dependence: that is looked for once they are scaled.
+    // Different units are no dependence, so this is tested on scaled columns.
     let (scaled, _) = scale(w)?;
     let scaled = singular_values(&scaled)?;
     let floor = scaled[0] * f64::EPSILON * w.nrows().max(w.ncols()) as f64;
@@ -102,9 +99,9 @@ pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresErr
     Ok(Some(plain[0] / plain[plain.len() - 1]).filter(|c| c.is_finite()))
 }
 
-/// Which `rank` columns to keep, by QR with column pivoting on columns of norm 1, and the numeric
-/// factors of the others: the fallback where no exact reduction is at hand.
-/// Fails when an entry is not finite or there are no columns; `rank` is cut to what there is.
+/// Chooses `rank` columns by QR with column pivoting on columns of norm 1, with the numeric factors of the others: the
+/// fallback without an exact reduction.
+/// Fails if an entry is not finite or there are no columns; `rank` is limited to the possible rank.
 pub fn reduce_numerically(
     w: &DMatrix<f64>,
     rank: usize,
@@ -120,7 +117,7 @@ pub fn reduce_numerically(
     qr.p().permute_columns(&mut order);
     let mut kept: Vec<usize> = order.iter().copied().take(rank).collect();
     kept.sort_unstable();
-    // Once the columns are chosen, their own QR gives the factors in the order of the file.
+    // A QR factorisation of the chosen columns in the order of the file gives the factors.
     let basis = scaled.select_columns(&kept).qr();
     let (q, r) = (basis.q(), basis.r());
     let mut largest_residual: f64 = 0.0;
@@ -149,15 +146,11 @@ pub fn reduce_numerically(
     })
 }
 
-/// Columns whose norm is below this fraction of the largest one's are rounding noise, and count as zero: scaled to norm 1
-/// they would look like information.
-pub(crate) const NOISE_TOLERANCE: f64 = 1e-12;
-
-/// Sets norms that are rounding noise beside the largest one to zero.
+/// Sets norms to zero that are rounding noise relative to the largest one.
 pub(crate) fn zero_noise_columns(norms: &mut [f64]) {
     let largest = norms.iter().copied().fold(0.0, f64::max);
     for norm in norms {
-        if *norm < NOISE_TOLERANCE * largest {
+        if *norm < NOISE_COLUMN_TOLERANCE * largest {
             *norm = 0.0;
         }
     }
@@ -192,7 +185,7 @@ fn scale(w: &DMatrix<f64>) -> Result<(DMatrix<f64>, Vec<f64>), LeastSquaresError
 
 /// As many singular values as there are columns, largest first.
 fn singular_values(w: &DMatrix<f64>) -> Result<Vec<f64>, LeastSquaresError> {
-    // A tall matrix is reduced to its triangle first: same values, far less work.
+    // A tall matrix is reduced to its R factor first: same singular values, far less work.
     let small = if w.nrows() > w.ncols() {
         w.clone().qr().r()
     } else {

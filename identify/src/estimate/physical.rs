@@ -1,6 +1,5 @@
-//! Parameters that bodies can have: reduced rows and a description of the bodies go in, physical
-//! parameters with positive definite pseudo-inertias come out, nearest to the nominal ones among
-//! those that fit the recording.
+//! Physically possible parameters. Input: reduced rows and a description of the bodies; output: physical parameters
+//! with positive definite pseudo-inertias that fit the recording and are nearest to the nominal ones.
 //!
 //! A body is possible if and only if its pseudo-inertia `[S h; h' m]`, `S = 1/2 tr(I) 1 - I`, is
 //! positive definite: P. M. Wensing, S. Kim and J.-J. E. Slotine, "Linear matrix inequalities for
@@ -9,19 +8,18 @@
 //! `1/2 |R p(x) - Q'y|^2 / s^2 + g sum_b D(P_b(x) | P_b(nominal))`,
 //! `D(P | P0) = tr(P0^-1 P) - log det(P0^-1 P) - 4`,
 //!
-//! is looked for over the physical parameters `x`, where `s` is the residuals' standard deviation
-//! with autocorrelation allowed for. `D` is the entropic (Bregman) divergence of T. Lee, P. M.
-//! Wensing and F. C. Park, "Geometric robot dynamic identification", IEEE T-RO 36 (2020): free of
-//! units and of the choice of frames, and infinite where a body ends to be possible, so that it
-//! keeps all of them inside; unlike the log-Cholesky parametrisation of C. Rucker and P. M. Wensing
-//! (RA-L 7, 2022) it needs no body with ten parameters of its own, so that parameters may be shared
-//! between bodies, and planar and lumped ones are treated alike. With a small `g` it decides only
-//! what the recording does not. The minimum is found by Gauss's and Newton's steps, damped after
-//! Levenberg and Marquardt and shortened to stay inside, with `g` falling from where both terms weigh alike.
+//! is taken over the physical parameters `x`, where `s` is the residuals' standard deviation with autocorrelation
+//! allowed for. `D` is the entropic (Bregman) divergence of T. Lee, P. M. Wensing and F. C. Park, "Geometric robot
+//! dynamic identification", IEEE T-RO 36 (2020). It does not depend on units or on the choice of frames, and it is
+//! infinite at the limit of possible bodies, so that all bodies stay possible. Unlike the log-Cholesky parametrisation
+//! of C. Rucker and P. M. Wensing (RA-L 7, 2022) it does not need ten parameters per body, so that parameters may be
+//! shared between bodies, and planar and lumped ones need no special treatment. With a small `g` it decides only what
+//! the recording does not. The minimum is found by Gauss-Newton steps, damped after Levenberg and Marquardt and
+//! shortened to stay inside, with `g` decreasing from a value at which both terms are equal.
 //!
-//! Decision: a physical parameter is determined by itself if its unit vector lies in the span of the rows. A
-//! variance that falls is no proof of that, because the limits of possible bodies and the nominal values of other
-//! parameters lower it too.
+//! Decision: a physical parameter is determined individually if its unit vector lies in the span of the rows. A lower
+//! variance is no proof of that, because the limits of possible bodies and the nominal values of other parameters lower
+//! it too.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -31,41 +29,41 @@ use crate::estimate::divergence::{BaseMap, MisfitFunction, step_scales};
 use crate::estimate::error::PhysicalError;
 use crate::estimate::prior::variance_inflation;
 use crate::estimate::solution::RegressionSolution;
+use crate::estimate::thresholds::{INDIVIDUAL_MOST_OUTSIDE, PHYSICAL_SPAN_TOLERANCE};
 use crate::estimate::triangle::RFactor;
 
-/// Weight of the nominal values in the end; see the module.
+/// Final weight `g` of the nominal values.
 pub const NOMINAL_WEIGHT: f64 = 0.01;
 
-/// Directions below this share of the largest singular value are told by rounding only.
-const SPAN_TOLERANCE: f64 = 1e-10;
-
-/// Physical parameters that are possible.
+/// Physically possible parameters with their uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalParameters {
-    /// All physical parameters.
+    /// Values of all physical parameters.
     pub parameters: Vec<f64>,
-    /// Their standard deviations if nominal values may be off by their own size (`g = 1`).
+    /// Their standard deviations if nominal values may be wrong by their own size (`g = 1`).
     pub std: Vec<f64>,
-    /// By how much the recording lowers the variance that the nominal values alone leave, 0 to 1; near 0 it is the nominal
-    /// value that one sees. What is not [`alone`](Self::alone) owes some of it to nominal values of others.
+    /// Relative decrease of the variance by the recording, compared with the nominal values alone, 0 to 1; near 0 the
+    /// value is the nominal one. For a parameter that is not
+    /// [`individually_determined`](Self::individually_determined), a part of it comes from nominal values of others.
     pub from_recording: Vec<f64>,
-    /// Whether the recording tells a parameter by itself. If not, it tells combinations of it with others only, and what
-    /// bodies can be and nominal values of the others share them out.
+    /// Whether the recording determines a parameter individually. If not, it determines only combinations with others,
+    /// and the limits of possible bodies and the nominal values divide them.
     pub individually_determined: Vec<bool>,
-    /// The base parameters that follow.
+    /// Base parameters of these physical parameters.
     pub base: Vec<f64>,
     /// Their standard deviations.
     pub base_std: Vec<f64>,
     /// Norm of the residual.
     pub residual_norm: f64,
-    /// For each body the smallest eigenvalue of its matrix relative to the nominal one.
+    /// For each body the smallest eigenvalue of its matrix relative to the nominal one; near 0 the body is nearly
+    /// impossible.
     pub margins: Vec<f64>,
-    /// Steps that were made.
+    /// Number of iterations.
     pub iterations: usize,
 }
 
-/// Possible physical parameters that fit the rows of `triangle`, whose solution and deviations are given, nearest to
-/// `nominal`, at which every body must be possible.
+/// Finds possible physical parameters that fit the rows of `triangle` and are nearest to `nominal`, at which every body
+/// must be possible. `solution` and `deviations` belong to `triangle`.
 pub fn physical_parameters(
     triangle: &RFactor,
     solution: &RegressionSolution,
@@ -75,6 +73,7 @@ pub fn physical_parameters(
     bodies: &[BodyMatrix<'_>],
 ) -> Result<PhysicalParameters, PhysicalError> {
     let noise = (solution.residual_variance() * variance_inflation(solution, deviations)).sqrt();
+    // Without noise the misfit would have infinite weight, so the noise is limited from below.
     let least = 1e-7 * solution.measured_norm / (solution.rows.max(1) as f64).sqrt();
     let noise = if noise > least {
         noise
@@ -95,13 +94,13 @@ pub fn physical_parameters(
     };
     let mut x = DVector::from_column_slice(nominal);
     let mut iterations = 0;
-    // From where nominal values and recording weigh alike, along the path of minima.
+    // Start with equal weights of nominal values and recording, then follow the minima as the weight decreases.
     let mut weight = problem.value(&x, 0.0).unwrap_or(1.0).max(1.0);
     while weight > NOMINAL_WEIGHT {
         weight = (weight * 0.1_f64).max(NOMINAL_WEIGHT);
         iterations += problem.minimise(&mut x, weight)?;
     }
-    // What is left open if nominal values may be off by their own size.
+    // Uncertainty if nominal values may be wrong by their own size.
     let point = problem
         .evaluate_at(&x, 1.0)
         .ok_or(PhysicalError::NoConvergence)?;
@@ -141,7 +140,8 @@ pub fn physical_parameters(
     })
 }
 
-/// Which unknowns of linear equations have a value of their own: those whose unit vector lies in the span of the rows.
+/// Which unknowns of linear equations are determined individually: those whose unit vector lies in the span of the
+/// rows.
 fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
     let mut scaled = rows.clone();
     for mut column in scaled.column_iter_mut() {
@@ -157,16 +157,19 @@ fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
     };
     let mut within = vec![0.0; rows.ncols()];
     for (direction, value) in span.row_iter().zip(svd.singular_values.iter()) {
-        if *value > SPAN_TOLERANCE * largest {
+        if *value > PHYSICAL_SPAN_TOLERANCE * largest {
             for (sum, component) in within.iter_mut().zip(direction.iter()) {
                 *sum += component * component;
             }
         }
     }
-    within.iter().map(|share| *share > 1.0 - 1e-6).collect()
+    within
+        .iter()
+        .map(|share| *share > 1.0 - INDIVIDUAL_MOST_OUTSIDE)
+        .collect()
 }
 
-/// Inverse of a symmetric matrix where it has one; nothing is known along the rest, which is left away.
+/// Pseudo-inverse of a symmetric matrix with its diagonal scaled to 1; directions without information are left out.
 fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
     let scale = matrix
@@ -372,7 +375,7 @@ mod tests {
         assert!(best <= objective(&case.nominal) && best <= objective(&case.truth));
     }
 
-    /// What the recording does not say stays at its nominal value, and is known to do so.
+    /// A parameter that the recording does not determine stays at its nominal value, and is marked so.
     #[test]
     fn without_information_the_nominal_values_stay() {
         let mut case = case(7, 1e-4);
@@ -394,14 +397,14 @@ mod tests {
             assert!(found.from_recording[j] < 1e-9);
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
-        // Fourteen combinations of ten numbers tell each of them.
+        // Fourteen combinations of ten numbers determine each of them.
         assert_eq!(
             found.individually_determined,
             [[true; 10], [false; 10]].concat()
         );
     }
 
-    /// Of `x + y` and `z` only the last has a value of its own, whatever nominal values say beside.
+    /// Of `x + y` and `z` only the last is determined individually, whatever the nominal values are.
     #[test]
     fn what_is_told_in_sums_only_is_not_told_alone() {
         let rows = DMatrix::from_row_slice(
@@ -414,7 +417,7 @@ mod tests {
             individually_determined(&DMatrix::zeros(2, 2)),
             [false, false]
         );
-        // Fourteen combinations of twenty numbers tell none of them.
+        // Fourteen combinations of twenty numbers determine none of them.
         assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
 

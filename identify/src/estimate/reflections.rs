@@ -1,5 +1,5 @@
-//! Householder reflections of a block of rows into an upper triangle, in the widest vectors of the processor that runs
-//! it: the inner loop of [`LeastSquares`](crate::LeastSquares).
+//! Householder reflections of a block of rows into an R factor, with the widest vector instructions of the processor:
+//! the inner loop of [`LeastSquares`](crate::LeastSquares).
 //!
 //! Decision: `pulp` compiles this loop for several instruction sets from safe code. Sums in wider vectors round
 //! differently, so identified values agree between machines to rounding only.
@@ -9,7 +9,7 @@ use pulp::{Arch, Simd, WithSimd};
 /// Numbers of a block are padded with zero rows to a multiple of this, which no vector exceeds.
 pub(crate) const LANES: usize = 8;
 
-/// Columns of rows that are reduced together; `stride` numbers per column, a multiple of [`LANES`].
+/// Columns of a block of rows; `stride` numbers per column, a multiple of [`LANES`].
 pub(crate) struct HouseholderBlock<'a> {
     /// Column after column.
     pub(crate) columns: &'a mut [f64],
@@ -19,7 +19,7 @@ pub(crate) struct HouseholderBlock<'a> {
     pub(crate) rows: usize,
 }
 
-/// Folds a block into the row-major upper triangle of as many columns; the block is used up.
+/// Reduces a block into the row-major R factor with the same number of columns; the block is overwritten.
 pub(crate) fn fold_into_factor(triangle: &mut [f64], block: HouseholderBlock<'_>) {
     Arch::new().dispatch(HouseholderFold {
         factor: triangle,
@@ -27,6 +27,7 @@ pub(crate) fn fold_into_factor(triangle: &mut [f64], block: HouseholderBlock<'_>
     });
 }
 
+/// Arguments of the reduction, as `pulp` needs them in one value.
 struct HouseholderFold<'a> {
     factor: &'a mut [f64],
     block: HouseholderBlock<'a>,
@@ -35,7 +36,7 @@ struct HouseholderFold<'a> {
 impl WithSimd for HouseholderFold<'_> {
     type Output = ();
 
-    #[allow(clippy::inline_always, reason = "the trait's manual asks for it")]
+    #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let HouseholderBlock {
@@ -49,7 +50,7 @@ impl WithSimd for HouseholderFold<'_> {
             let (head, tail) = columns.split_at_mut((k + 1) * stride);
             let pivot = &head[k * stride..k * stride + rows];
             let [below] = dots(simd, pivot, [pivot]);
-            // Columns that are zero in all these rows, as those of links before a joint, cost nothing.
+            // Columns that are zero in all these rows, such as those of links before a joint, cost nothing.
             if below == 0.0 {
                 continue;
             }
@@ -60,6 +61,7 @@ impl WithSimd for HouseholderFold<'_> {
             let v0 = alpha - beta;
             let (tau, inverse) = (-v0 / beta, v0.recip());
             row[k] = beta;
+            // Apply the reflection to the columns behind, four at a time.
             let mut entries = row[k + 1..].chunks_exact_mut(4);
             let mut fours = tail.chunks_exact_mut(4 * stride);
             for (entries, four) in (&mut entries).zip(&mut fours) {
@@ -76,6 +78,7 @@ impl WithSimd for HouseholderFold<'_> {
                 }
                 add_scaled(simd, factors, pivot, [a, b, c, d]);
             }
+            // The remaining one to three columns.
             let entries = entries.into_remainder().iter_mut();
             let ones = fours.into_remainder().chunks_exact_mut(stride);
             for (entry, column) in entries.zip(ones) {
@@ -89,12 +92,13 @@ impl WithSimd for HouseholderFold<'_> {
     }
 }
 
-/// Dot products of one column with `N` others, all of whole vectors.
+/// Dot products of one column with `N` others, all with complete vectors.
 #[allow(clippy::inline_always, reason = "part of the loop above")]
 #[inline(always)]
 fn dots<S: Simd, const N: usize>(simd: S, pivot: &[f64], columns: [&[f64]; N]) -> [f64; N] {
     let (pivot, _) = S::as_simd_f64s(pivot);
     let columns = columns.map(|column| &S::as_simd_f64s(column).0[..pivot.len()]);
+    // Two sums per product hide the latency of the additions.
     let mut even = [simd.splat_f64s(0.0); N];
     let mut odd = even;
     let pairs = pivot.len() / 2;

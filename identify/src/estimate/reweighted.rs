@@ -1,5 +1,5 @@
-//! Weighted and robust least squares by reweighting: showings of the rows go in, a solution with
-//! deviations and the weights that it was made with come out. Memory does not grow with the rows.
+//! Weighted and robust least squares by reweighting. Input: passes over the rows; output: a solution with its
+//! uncertainty and weights. Memory does not grow with the rows.
 //!
 //! Weights of channels are the inverse standard deviations of their residuals, iterated from the
 //! unweighted solution: M. Gautier and P. Poignet, Control Engineering Practice 9 (2001), section
@@ -19,20 +19,17 @@ use crate::estimate::weighted_rows::{
     RowWeighting, WeightedRows, outlier_share, residual_scales, reweight_rows, show_weighted,
 };
 
-/// Huber's bound for 95 % efficiency under normal residuals, in standard deviations.
-pub const HUBER_BOUND: f64 = 1.345;
-
-/// Solutions that move by less than this part of a standard deviation have settled.
+/// Solutions that change by less than this share of a standard deviation have converged.
 const CONVERGENCE_TOLERANCE: f64 = 1e-3;
 
-/// What is estimated, and how.
+/// Options of an estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimateOptions {
     /// Divide each channel by the standard deviation of its residuals.
     pub by_channel: bool,
-    /// Huber's bound in standard deviations; none for ordinary least squares.
+    /// Huber's bound in standard deviations; `None` for ordinary least squares.
     pub huber: Option<f64>,
-    /// Solutions at most.
+    /// Largest number of solutions.
     pub iterations: usize,
 }
 
@@ -46,24 +43,24 @@ impl Default for EstimateOptions {
     }
 }
 
-/// A solution, what it is worth, and how it came about.
+/// A solution with its uncertainty and weights.
 #[derive(Debug, Clone)]
 pub struct WeightedEstimate {
     /// The solution; its norms are those of the weighted rows.
     pub solution: RegressionSolution,
-    /// Its deviations.
+    /// Its standard deviations.
     pub uncertainty: ParameterUncertainty,
-    /// The weights.
+    /// Weights of the rows.
     pub weighting: RowWeighting,
-    /// The reduced rows that it was made from, weighted.
+    /// R factor of the weighted rows.
     pub r_factor: RFactor,
 }
 
-/// Estimates `nominal.len()` parameters from the rows that `show` presents, interleaved per sample, in order of time,
-/// the same in every showing; undetermined directions stay at `nominal`.
+/// Estimates `nominal.len()` parameters from the rows that `show` presents, interleaved per sample, in order of time
+/// and the same in every pass. Undetermined directions stay at `nominal`.
 ///
-/// Ordinary least squares shows the rows three times, each reweighting twice more.
-/// Fails when `show` fails, when there are no rows, or when a number is not finite.
+/// Ordinary least squares needs three passes, each reweighting two more.
+/// Fails if `show` fails, if there are no rows, or if a number is not finite.
 ///
 /// ```
 /// use modelmill_identify::estimate::{EstimateOptions, HUBER_BOUND, estimate};
@@ -117,6 +114,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
             });
         }
     }
+    // Robust estimates use the second derivatives of Huber's function in the covariance.
     let triangle = RFactor::new(&regression);
     if weighting.huber.is_some() {
         let curvature = reweight_rows(
@@ -154,6 +152,7 @@ mod tests {
 
     use super::*;
     use crate::estimate::prior::{ParameterPrior, solve_with_prior};
+    use crate::estimate::thresholds::HUBER_BOUND;
     use crate::estimate::weighted_rows::dot;
     use crate::test_noise::TestNoise;
 
@@ -337,7 +336,7 @@ mod tests {
         );
     }
 
-    /// How often the truth is within two deviations, of 200.
+    /// How often the true value is within two standard deviations, of 200.
     fn coverage(options: &EstimateOptions, memory: f64, spoilt: f64) -> f64 {
         let mut noise = TestNoise::new(77);
         let mut inside = 0;

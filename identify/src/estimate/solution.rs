@@ -1,51 +1,47 @@
-//! What a regression found: the triangle of the reduced rows goes in; parameters, rank, condition
-//! numbers and classical deviations come out, with what is not determined named.
+//! Solution of a regression. Input: its R factor. Output: parameters, rank, condition numbers and classical standard
+//! deviations, with a list of what is not determined.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::numeric_rank::zero_noise_columns;
+use crate::estimate::thresholds::RANK_TOLERANCE;
 use crate::estimate::undetermined::{NullDirection, null_directions};
 
-/// Singular values of the column-scaled regressor below this fraction of the largest one count
-/// as zero. Rounding leaves about 1e-15; what is larger is information, however weak, and the
-/// standard deviations say how weak.
-pub const RANK_TOLERANCE: f64 = 1e-11;
-
-/// How many rows a regression has seen.
+/// Number of rows of a regression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct RowCount {
     /// All of them.
     pub(crate) shown: usize,
-    /// Those that are not zero throughout: `0 = 0` is no equation, whatever the parameters.
+    /// Those that are not zero: `0 = 0` is no equation.
     pub(crate) informative: usize,
 }
 
-/// What a regression found. Lists are in the order of the regressor's columns.
+/// Solution of a regression. Lists are in the order of the regressor's columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RegressionSolution {
     /// Parameters, in the units of measured value per unit of the column.
     pub values: Vec<f64>,
-    /// Standard deviations under the classical assumption of independent residuals of equal
-    /// variance, which recordings hardly ever meet; infinite for what is not determined, NaN when
-    /// there are no more rows than parameters. See [`Deviations`](crate::Deviations) for honest ones.
+    /// Standard deviations for independent residuals of equal variance, which recordings hardly ever have; infinite for
+    /// undetermined parameters, NaN if there are no more rows than parameters. See
+    /// [`ParameterUncertainty`](crate::ParameterUncertainty) for realistic ones.
     pub classical_std: Vec<f64>,
-    /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite
-    /// when the rank is deficient.
+    /// Ratio of the largest to the smallest singular value of the regressor (2-norm); infinite if the rank is
+    /// deficient.
     pub condition_number: f64,
-    /// The same after scaling all columns to norm 1, hence free of units.
+    /// The same after scaling all columns to norm 1, which is independent of units.
     pub scaled_condition_number: f64,
     /// `|W p - y|`, 2-norm.
     pub residual_norm: f64,
     /// `|y|`, 2-norm.
     pub measured_norm: f64,
-    /// Rows of the regressor that say something: those of zeros alone, as a weight of 0 leaves them, do not count.
+    /// Number of rows with information; rows of zeros, such as those with weight 0, do not count.
     pub rows: usize,
-    /// All rows that were shown.
+    /// Number of all rows.
     pub shown: usize,
     /// Numeric rank of the column-scaled regressor.
     pub rank: usize,
-    /// Which parameters the rows determine.
+    /// Whether the rows determine each parameter.
     pub determined: Vec<bool>,
     /// Directions along which parameters may change without any effect on the rows;
     /// `n - rank` of them.
@@ -60,8 +56,8 @@ impl RegressionSolution {
         &self.r_inverse * self.r_inverse.transpose()
     }
 
-    /// Takes the inverse and the classical deviations of another solution for the same parameters, which says how far
-    /// values follow from gradients.
+    /// Adopts the inverse and the classical standard deviations of another solution for the same parameters, which
+    /// relates values to gradients.
     pub(crate) fn adopt_inverse(&mut self, other: Self) {
         self.r_inverse = other.r_inverse;
         self.classical_std = other.classical_std;
@@ -70,7 +66,7 @@ impl RegressionSolution {
         }
     }
 
-    /// Variance of the residuals with the degrees of freedom taken off; NaN without any left.
+    /// Variance of the residuals, corrected for the degrees of freedom; NaN without any.
     pub fn residual_variance(&self) -> f64 {
         match self.rows.saturating_sub(self.rank) {
             0 => f64::NAN,
@@ -97,8 +93,8 @@ impl RegressionSolution {
     }
 }
 
-/// Solves the upper triangle `[R, Q'y; 0, +-|residual|]`, row-major, that so many rows left; where
-/// it does not determine the parameters they stay at `nominal`, whose length gives their number.
+/// Solves the factor `[R, Q'y; 0, +-|residual|]`, row-major, of a number of rows. Undetermined parameters stay at
+/// `nominal`, whose length is the number of parameters.
 pub(crate) fn solve_r_factor(
     triangle: &[f64],
     rows: RowCount,
@@ -123,6 +119,7 @@ pub(crate) fn solve_r_factor(
             *norm = 1.0;
         }
     }
+    // The rank follows from the singular values of the scaled columns.
     let svd = nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000)
         .ok_or(LeastSquaresError::NoConvergence)?;
     let (Some(u), Some(vt)) = (&svd.u, &svd.v_t) else {
@@ -148,6 +145,7 @@ pub(crate) fn solve_r_factor(
         })
     };
     let dropped: Vec<usize> = (0..n).filter(|i| !kept.contains(i)).collect();
+    // Right singular vectors of the zero singular values are the undetermined directions.
     let null_space = DMatrix::from_fn(dropped.len(), n, |i, j| vt[(dropped[i], j)]);
     let (determined, undetermined) = null_directions(&null_space, &norms);
     let start = DVector::from_column_slice(nominal);

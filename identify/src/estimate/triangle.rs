@@ -1,4 +1,4 @@
-//! Reduced rows as a value of their own: what a regression is, for all that is computed from it without the samples.
+//! The R factor as a value of its own: the input of all computations that do not need the samples.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,17 +6,19 @@ use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
 use crate::estimate::solution::{RegressionSolution, RowCount, solve_r_factor};
 
-/// The upper triangle `[R, Q'y; 0, +-|residual|]` of some rows: all that they say about the parameters.
+/// The factor `[R, Q'y; 0, +-|residual|]` of some rows: all their information on the parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RFactor {
+    /// Number of parameters.
     n: usize,
+    /// Number of rows that were reduced.
     rows: RowCount,
     /// `(n + 1) x (n + 1)` by rows.
     entries: Vec<f64>,
 }
 
 impl RFactor {
-    /// What a regression has reduced.
+    /// The factor of a regression.
     pub fn new(regression: &LeastSquares) -> Self {
         Self {
             n: regression.n_parameters(),
@@ -25,9 +27,9 @@ impl RFactor {
         }
     }
 
-    /// The triangle of `n` parameters whose entries, from [`Triangle::entries`], were kept elsewhere, and from how many rows they
-    /// came, those of zeros left out.
-    /// Fails when there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
+    /// Restores the factor of `n` parameters from stored [`RFactor::entries`] and the number of its rows, those of
+    /// zeros excluded.
+    /// Fails if there are not `(n + 1)(n + 2) / 2` entries or one is not finite.
     pub fn from_entries(n: usize, rows: usize, entries: &[f64]) -> Result<Self, LeastSquaresError> {
         let width = n + 1;
         if entries.len() != width * (width + 1) / 2 {
@@ -63,7 +65,7 @@ impl RFactor {
         })
     }
 
-    /// The entries of the triangle `[R, Q'y; 0, +-|residual|]` by rows, without the zeros below its diagonal.
+    /// The entries of the factor `[R, Q'y; 0, +-|residual|]` by rows, without the zeros below its diagonal.
     pub fn entries(&self) -> Vec<f64> {
         let width = self.n + 1;
         (0..width)
@@ -72,7 +74,7 @@ impl RFactor {
             .collect()
     }
 
-    /// The triangle of the rows of both. Fails when the numbers of parameters differ.
+    /// The factor of the rows of both. Fails if the numbers of parameters differ.
     pub fn merge_with(&self, other: &Self) -> Result<Self, LeastSquaresError> {
         if self.n != other.n {
             return Err(LeastSquaresError::NominalLength {
@@ -101,12 +103,12 @@ impl RFactor {
         self.n
     }
 
-    /// Rows that were reduced, those of zeros left out.
+    /// Number of rows that were reduced, those of zeros excluded.
     pub fn rows(&self) -> usize {
         self.rows.informative
     }
 
-    /// Says from how many rows the reduced ones came.
+    /// Sets the number of rows from which the factor came.
     pub(crate) fn set_row_count(&mut self, rows: RowCount) {
         self.rows = rows;
     }
@@ -121,7 +123,7 @@ impl RFactor {
         DVector::from_fn(self.n, |i, _| self.entries[i * (self.n + 1) + self.n])
     }
 
-    /// The norm of the residual that no parameters can explain.
+    /// Norm of the residual that no parameters can explain.
     pub fn residual_norm(&self) -> f64 {
         self.entries[self.entries.len() - 1].abs()
     }
@@ -131,7 +133,7 @@ impl RFactor {
         solve_r_factor(&self.entries, self.rows, nominal)
     }
 
-    /// The same rows for the differences of the parameters from some values.
+    /// The same rows for parameters relative to some values.
     pub(crate) fn relative_to(&self, values: &[f64]) -> Self {
         let mut shifted = self.clone();
         for row in shifted.entries.chunks_exact_mut(self.n + 1) {
@@ -141,8 +143,7 @@ impl RFactor {
         shifted
     }
 
-    /// The regression of some of the columns alone; the parameters of the others are 0.
-    /// Fails when a column is not there.
+    /// The factor of some of the columns alone; the parameters of the others are 0. Fails if a column does not exist.
     pub fn select_columns(&self, columns: &[usize]) -> Result<Self, LeastSquaresError> {
         let width = self.n + 1;
         let mut regression = LeastSquares::new(columns.len());
@@ -156,8 +157,8 @@ impl RFactor {
         })
     }
 
-    /// The same with further rows, `n` numbers and a right-hand side each, which do not count as measured ones.
-    /// Fails when the lengths do not fit.
+    /// The same with additional rows, `n` numbers and a right side each, which do not count as measured ones. Fails if
+    /// the lengths do not match.
     pub fn with_rows(&self, regressor: &[f64], right: &[f64]) -> Result<Self, LeastSquaresError> {
         let width = self.n + 1;
         let mut regression = LeastSquares::new(self.n);

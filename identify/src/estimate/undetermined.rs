@@ -1,7 +1,8 @@
-//! What a recording does not determine: a null space goes in, readable directions come out.
+//! Undetermined directions. Input: a null space; output: sparse, readable directions.
 
 use nalgebra::DMatrix;
 
+use crate::estimate::thresholds::PARTICIPATION_TOLERANCE;
 use crate::words::with_digits;
 
 /// A change of the parameters that changes no row of the regressor.
@@ -12,7 +13,7 @@ pub struct NullDirection {
 }
 
 impl NullDirection {
-    /// One sentence with the parameters' names; a parameter beyond the list is called `#index`.
+    /// One sentence with the parameters' names; a parameter without a name is called `#index`.
     pub fn describe(&self, names: &[String]) -> String {
         let name = |i: usize| names.get(i).cloned().unwrap_or_else(|| format!("#{i}"));
         let list: Vec<String> = self.changes.iter().map(|(i, _)| name(*i)).collect();
@@ -38,13 +39,10 @@ impl NullDirection {
     }
 }
 
-/// Entries of unit null vectors below this are rounding.
-const PARTICIPATION_TOLERANCE: f64 = 1e-6;
-
-/// Which parameters take part in no null vector, and a sparse basis of the null space.
+/// Whether each parameter is outside of all null vectors, and a sparse basis of the null space.
 ///
-/// `null_space` holds one unit vector per row, in columns scaled by `norms`; elimination with
-/// complete pivoting makes each direction start with a parameter that no other one contains.
+/// `null_space` has one unit vector per row, in columns scaled by `norms`. Elimination with complete pivoting makes
+/// each direction start with a parameter that no other direction contains.
 pub(crate) fn null_directions(
     null_space: &DMatrix<f64>,
     norms: &[f64],
@@ -59,7 +57,7 @@ pub(crate) fn null_directions(
         let mut best = (0.0, step, 0);
         for i in step..basis.nrows() {
             for j in 0..n {
-                // Entries that are equal but for rounding must not decide by it: the first wins.
+                // Of entries that are equal up to rounding, the first is the pivot.
                 if basis[(i, j)].abs() > best.0 * (1.0 + 1e-9) {
                     best = (basis[(i, j)].abs(), i, j);
                 }
@@ -69,6 +67,7 @@ pub(crate) fn null_directions(
         if size <= PARTICIPATION_TOLERANCE {
             break;
         }
+        // Scale the pivot row and remove its parameter from all other rows.
         basis.swap_rows(step, row);
         let pivot = basis[(step, column)];
         basis.row_mut(step).unscale_mut(pivot);
@@ -80,6 +79,7 @@ pub(crate) fn null_directions(
         }
         pivots.push(column);
     }
+    // Undo the scaling of the columns.
     let directions = pivots
         .iter()
         .enumerate()

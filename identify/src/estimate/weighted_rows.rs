@@ -1,8 +1,8 @@
-//! Rows times their weights, and the scales of residuals that weights are made from.
+//! Weighted rows, and the scales of residuals from which weights are computed.
 //!
-//! Decision: weights are factors of rows. Variances, standstill, scales of channels and Huber's function multiply
-//! rows of regressor and force alike. A force that was not measured makes its row zero before any filter, so
-//! nothing has to be invented. Rows of zeros are no residuals, while error figures count every sample.
+//! Decision: weights are factors of rows. Variances, standstill, scales of channels and Huber's function multiply rows
+//! of regressor and force equally. A force that was not measured makes its row zero before any filter, so no value has
+//! to be invented. Rows of zeros are no residuals, while error figures count every sample.
 
 use crate::estimate::error::LeastSquaresError;
 use crate::estimate::least_squares::LeastSquares;
@@ -10,33 +10,34 @@ use crate::estimate::magnitudes::MagnitudeHistogram;
 use crate::estimate::rows::{RowVisitor, is_uninformative};
 use crate::estimate::solution::RegressionSolution;
 
-/// What each row was multiplied by in the end.
+/// Final weights of the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowWeighting {
-    /// For each channel the scale of its residuals, in the units of the measured value (as shown).
+    /// Scale of the residuals of each channel, in the unit of the measured value.
     pub scales: Vec<f64>,
-    /// Whether rows were divided by it.
+    /// Whether rows were divided by this scale.
     pub by_channel: bool,
-    /// Huber's bound in scales.
+    /// Huber's bound in multiples of the scale; `None` for ordinary least squares.
     pub huber: Option<f64>,
-    /// Share of the rows whose residual was beyond the bound.
+    /// Share of the rows whose residual exceeded the bound, 0 to 1.
     pub outliers: f64,
-    /// Solutions that were made.
+    /// Number of solutions.
     pub iterations: usize,
-    /// Whether the last two agreed.
+    /// Whether the last two solutions agreed.
     pub converged: bool,
 }
 
-/// Which rows a reweighting makes.
+/// Kind of rows that a reweighting computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WeightedRows {
     /// Regressor and measured value times the root of the weight: their gradient is that of Huber's function.
     Weighted,
-    /// WeightedRows within the bound only, with the residual that Huber's function sees: the second derivatives.
+    /// Rows within the bound only, with the clipped residual of Huber's function: the second derivatives.
     Curvature,
 }
 
-/// The scale of each channel's residuals: standard deviation, or median magnitude for robust estimates.
+/// Scale of each channel's residuals: the standard deviation, or 1.4826 times the median magnitude for robust
+/// estimates.
 pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
     solution: &RegressionSolution,
     weighting: &RowWeighting,
@@ -75,7 +76,7 @@ pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
             let freedom = (samples - solution.rank as f64 / channels as f64).max(1.0);
             let spread = (squares[channel] / freedom).sqrt();
             let scale = medians.get(channel).map_or(spread, |m| 1.4826 * m.median());
-            // A channel without any residual must not get all the weight there is.
+            // A channel without residual must not get infinite weight.
             let least = 1e-12 * (size[channel] / samples).sqrt();
             if scale > least {
                 scale
@@ -86,7 +87,7 @@ pub(crate) fn residual_scales<E: From<LeastSquaresError>>(
         .collect())
 }
 
-/// The regression of reweighted rows.
+/// Regression of the reweighted rows.
 pub(crate) fn reweight_rows<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
@@ -101,7 +102,7 @@ pub(crate) fn reweight_rows<E: From<LeastSquaresError>>(
     Ok(regression)
 }
 
-/// The share of rows beyond Huber's bound.
+/// Share of the rows whose residual exceeds Huber's bound.
 pub(crate) fn outlier_share<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
@@ -122,7 +123,7 @@ pub(crate) fn outlier_share<E: From<LeastSquaresError>>(
     Ok(beyond as f64 / counted.max(1) as f64)
 }
 
-/// Shows weighted rows for residuals at `values`.
+/// Passes weighted rows to `visit`, with weights from the residuals at `values`.
 pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
     values: &[f64],
     channels: usize,
@@ -147,6 +148,7 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
             let inside = weighting
                 .huber
                 .is_none_or(|bound| error.abs() <= bound * scale);
+            // Weight min(1, bound / |residual|) beyond the bound; its root multiplies the row.
             let root = match (weighting.huber, rows) {
                 (Some(bound), WeightedRows::Weighted) if !inside => {
                     (bound * scale / error.abs()).sqrt()
@@ -161,7 +163,7 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
             };
             scaled.extend(row.iter().map(|w| factor * w));
             right.push(match (weighting.huber, rows) {
-                // What Huber's function sees of the residual keeps the variance of its gradient.
+                // The clipped residual keeps the variance of the gradient.
                 (Some(bound), WeightedRows::Curvature) => {
                     let seen = error.clamp(-bound * scale, bound * scale);
                     let unit = if weighting.by_channel {
@@ -178,6 +180,7 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
     })
 }
 
+/// Inner product of two rows.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -1,20 +1,21 @@
-//! Limits kept at all times: a trajectory goes in; the same, shrunk as little as need be, comes out.
+//! Shrinks a trajectory until it is within its limits at all times. Input: a trajectory; output: the same trajectory,
+//! as little smaller as possible, and its margins.
 //!
 //! Decision: angles, rates and accelerations are trigonometric polynomials. Their extremes are bounded by interval
-//! halving with a bound of the second derivative, so that these limits hold at all times. Forces, points and
-//! singular values have no such bound; they are checked on a grid sixteen times finer than the search's, with a
-//! margin from parabolas through neighbours added twice.
+//! halving with a bound of the second derivative, so that these limits are kept at all times. Forces, points and
+//! singular values have no such bound; they are checked on a grid sixteen times finer than the search's, with a margin
+//! from parabolas through neighbours added twice.
 
 use super::measure::{TrajectoryEvaluator, excess};
 use super::{ExcitationLimits, ExcitationMotion, FourierSeries, LimitMargin};
 
-/// Samples over a period at which limits of the plant are checked, for each that the search uses.
+/// Number of samples at which limits of the plant are checked, per sample of the search.
 const LIMIT_CHECK_REFINEMENT: usize = 16;
-/// What a trajectory stays away from its limits, as a share of half the range: above all rounding.
+/// Distance from limits as a share of half the range, which is above all rounding.
 const LIMIT_CLEARANCE: f64 = 1e-7;
 
-/// How much larger a series may become around its mean value before rate or acceleration reach their limits; infinite
-/// if these are not limited.
+/// Largest factor by which a series may grow around its mean before rate or acceleration reach their limits; infinite
+/// without such limits.
 pub(super) fn max_scale_factor(limits: &ExcitationLimits, series: &FourierSeries) -> f64 {
     let mut factor = f64::INFINITY;
     for (derivative, range) in [(1, limits.rate), (2, limits.acceleration)] {
@@ -31,21 +32,21 @@ pub(super) fn max_scale_factor(limits: &ExcitationLimits, series: &FourierSeries
     factor
 }
 
-/// Shrinks each series to the limits of its coordinate, and all together to those of the plant; the value of what is
-/// left. `None` if nothing worth having is left.
+/// Shrinks each series to the limits of its coordinate, and all together to those of the plant. Returns the value of
+/// the criterion and the series; `None` if no useful trajectory remains.
 pub(super) fn shrink_to_limits(
     measure: &TrajectoryEvaluator<'_>,
     series: &[FourierSeries],
 ) -> Option<(f64, Vec<FourierSeries>)> {
     let kept = shrink_to_coordinate_limits(measure, series, 1.0);
-    // What the search left between the motion and its limits is mostly worth having.
+    // Filling the remaining distance to the limits usually improves the criterion.
     let filled = shrink_to_coordinate_limits(measure, series, f64::INFINITY);
     let all = [kept, filled].into_iter();
     let valued = all.filter_map(|one| shrink_to_plant_limits(measure, one));
     valued.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
-/// Each series within the limits of its coordinate.
+/// Shrinks or enlarges each series to the limits of its coordinate, by at most the factor `most`.
 fn shrink_to_coordinate_limits(
     measure: &TrajectoryEvaluator<'_>,
     series: &[FourierSeries],
@@ -57,7 +58,7 @@ fn shrink_to_coordinate_limits(
         .collect()
 }
 
-/// Shrinks all series together to the limits of the plant.
+/// Shrinks all series by a common factor to the limits of the plant.
 fn shrink_to_plant_limits(
     measure: &TrajectoryEvaluator<'_>,
     mut kept: Vec<FourierSeries>,
@@ -73,9 +74,9 @@ fn shrink_to_plant_limits(
                 let value = measure.criterion_value(&measure.sample_motion(&kept));
                 return value.is_finite().then_some((value, kept));
             }
-            // Steps follow the excess, so that little is given away.
+            // The step depends on the excess, so that the motion is not reduced more than needed.
             Some((_, excess)) => {
-                factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999)
+                factor *= (1.0 - 0.5 * (excess + 2.0 * LIMIT_CLEARANCE)).clamp(0.8, 0.9999);
             }
             None => factor *= 0.9,
         }
@@ -83,7 +84,8 @@ fn shrink_to_plant_limits(
     None
 }
 
-/// A series shrunk and shifted into its coordinate's limits, or enlarged to fill them, but by no more than `most`.
+/// A series shrunk and shifted into the limits of its coordinate, or enlarged to fill them, by at most the factor
+/// `most`.
 fn fit_into_ranges(limits: &ExcitationLimits, series: &FourierSeries, most: f64) -> FourierSeries {
     let [low, high] = limits.position;
     let space = LIMIT_CLEARANCE * (high - low);
@@ -96,13 +98,13 @@ fn fit_into_ranges(limits: &ExcitationLimits, series: &FourierSeries, most: f64)
         factor * (series.offset - least),
         factor * (greatest - series.offset),
     );
-    // The shift is at most what the search left over a limit.
+    // Shift the mean only as far as needed.
     kept.offset = series.offset.max(low + below).min(high - above);
     kept
 }
 
-/// The plant's limit that is exceeded most, with its excess between samples; the index one past the end and -1 if there
-/// are none. `None` where the mechanism cannot follow.
+/// Index and excess of the plant's limit that is exceeded most, between samples too. The index is `usize::MAX` and the
+/// excess -1 if there are no limits; `None` if the mechanism cannot follow.
 pub(super) fn worst_plant_limit(
     measure: &TrajectoryEvaluator<'_>,
     series: &[FourierSeries],
@@ -121,20 +123,21 @@ pub(super) fn worst_plant_limit(
     )
 }
 
-/// The largest value of a periodic function from its samples: the largest sample, and what a parabola through each
-/// three neighbours could hide between them, twice over.
+/// Upper estimate of a periodic function from its samples: the largest sample plus twice what a parabola through three
+/// neighbours could add between them.
 fn largest_between_samples(values: &[f64]) -> f64 {
     let n = values.len();
     let mut largest = f64::NEG_INFINITY;
     for i in 0..n {
         let (before, now, after) = (values[(i + n - 1) % n], values[i], values[(i + 1) % n]);
+        // A parabola rises above its middle sample by at most an eighth of the second difference.
         let second = (before - 2.0 * now + after).abs();
         largest = largest.max(now + 0.25 * second);
     }
     largest
 }
 
-/// How close a trajectory comes to each of its limits.
+/// Margins of a trajectory to all of its limits.
 pub(super) fn margins(
     measure: &TrajectoryEvaluator<'_>,
     series: &[FourierSeries],
@@ -152,6 +155,7 @@ pub(super) fn margins(
             }
         })
         .collect();
+    // Limits of the plant, on the fine grid.
     let fine = ExcitationMotion::sample(
         series,
         LIMIT_CHECK_REFINEMENT * super::samples_per_period(measure.options),

@@ -1,5 +1,4 @@
-//! Finite Fourier series, eq. (15) of the paper: coefficients go in; motion, and the extremes that it really has, come
-//! out.
+//! Finite Fourier series, eq. (15) of the paper. Input: coefficients; output: motion and its exact extremes.
 //!
 //! J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics and Automation 13 (1997).
 
@@ -9,12 +8,12 @@ use std::f64::consts::PI;
 /// `q(t) = offset + sum over k = 1.. of mu_k/(k omega) sin(k omega t) - nu_k/(k omega) cos(k omega t)`.
 ///
 /// ```
-/// use modelmill_identify::excite::Series;
-/// let series = Series { offset: 1.0, mu: vec![0.0, 4.0], nu: vec![0.0, 0.0], omega: 2.0 };
+/// use modelmill_identify::excite::FourierSeries;
+/// let series = FourierSeries { offset: 1.0, mu: vec![0.0, 4.0], nu: vec![0.0, 0.0], omega: 2.0 };
 /// // 1 + sin(4 t), with rate 4 cos(4 t)
 /// let [low, high] = series.extremes(0);
 /// assert!((low - 0.0).abs() < 1e-8 && (high - 2.0).abs() < 1e-8);
-/// assert_eq!(series.at(0.0), [1.0, 4.0, 0.0]);
+/// assert_eq!(series.at_time(0.0), [1.0, 4.0, 0.0]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct FourierSeries {
@@ -47,8 +46,8 @@ impl FourierSeries {
         2.0 * PI / self.omega
     }
 
-    /// Bounds on all values between which the coordinate (0), its rate (1) or its acceleration (2) moves, at any time:
-    /// never too narrow, and too wide by no more than 1e-9 of the motion's size.
+    /// Bounds of the coordinate (0), its rate (1) or its acceleration (2) at all times: never too narrow, and too wide
+    /// by at most 1e-9 of the motion's size.
     pub fn extremes(&self, derivative: usize) -> [f64; 2] {
         let mean = if derivative == 0 { self.offset } else { 0.0 };
         // Cosine and sine of each harmonic.
@@ -83,10 +82,10 @@ impl FourierSeries {
     }
 }
 
-/// An upper bound of `sum of c_k cos(k x) + s_k sin(k x)`, at most 1e-9 of the amplitudes' sum too high.
+/// Upper bound of `sum of c_k cos(k x) + s_k sin(k x)`, at most 1e-9 of the sum of the amplitudes too high.
 ///
-/// On an interval of width h the sum exceeds its greater end by at most `h^2/8` times a bound of its second
-/// derivative; intervals that could still matter are halved.
+/// On an interval of width h the sum exceeds its greater end by at most `h^2/8` times a bound of its second derivative.
+/// Intervals that may contain the maximum are halved.
 fn upper_bound(terms: &[[f64; 2]]) -> f64 {
     let value = |x: f64| -> f64 {
         let harmonics = terms.iter().enumerate();

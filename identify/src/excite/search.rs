@@ -1,12 +1,11 @@
-//! From a start to a local optimum: sequential quadratic programming (D. Kraft, 1988, the crate `slsqp`) on the
+//! Local optimisation from a start: sequential quadratic programming (D. Kraft, 1988, the crate `slsqp`) on the
 //! coefficients of eq. (17), with limits as smooth constraints.
 //!
-//! The largest excess over a limit is taken as `log(sum of exp(r * excess)) / r`, which is smooth and never below it
-//! (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
+//! The largest excess over a limit is approximated by `log(sum of exp(r * excess)) / r`, which is smooth and never
+//! below it (G. Kreisselmeier and R. Steinhauser, 1979); r grows from one round to the next.
 //!
-//! Decision: gradients are central differences over the some thirty coefficients, because evaluation in blocks
-//! makes each of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest
-//! excesses.
+//! Decision: gradients are central differences over about thirty coefficients, because evaluation in blocks makes each
+//! of them cheap. They need smooth functions: the logarithm of the condition number and smooth largest excesses.
 
 use std::cell::{Cell, RefCell};
 
@@ -15,29 +14,32 @@ use slsqp::{StopTols, minimize};
 use super::measure::{TrajectoryEvaluator, excess, half_width};
 use super::{ExcitationCriterion, ExcitationMotion, FourierSeries, SearchFlow};
 
-/// Sharpness of the smooth largest value, in the first round and in those that polish.
+/// Sharpness r of the smooth maximum, in the first round and in the refining ones.
 const FIRST: f64 = 50.0;
 const POLISH: [f64; 2] = [200.0, 800.0];
-/// Step of the differences, in coefficients that are of size 1.
+/// Step of the differences, for coefficients of size 1.
 const STEP: f64 = 1e-5;
-/// The same where effects are told apart. Many of them jump with the sign of a rate, which moves from one sample to the next
-/// only now and then: a difference over many such steps has the slope of their mean. On the SpiderMill it takes dry from
-/// viscous friction 6 % farther apart than short steps do, and costs nothing where nothing jumps.
+/// The same if effects are to be distinguished. Many of them jump with the sign of a rate, whose zero moves from one
+/// sample to the next only for large steps. A difference over many such steps gives the mean slope. On the SpiderMill
+/// it separates dry from viscous friction 6 % better than short steps, and it costs nothing where nothing jumps.
 const SEPARATION_STEP: f64 = 1e-2;
-/// The value of a trajectory that the mechanism cannot follow.
+/// Value of a trajectory that the mechanism cannot follow.
 const INFEASIBLE_VALUE: f64 = 1e3;
 
 /// Objective and constraints at a point, with their derivatives.
 struct ConstraintLinearisation {
+    /// Coefficients of the point.
     point: Vec<f64>,
+    /// The objective, then the constraints.
     values: Vec<f64>,
+    /// Their gradients, in the same order.
     gradients: Vec<Vec<f64>>,
 }
 
-/// Rounds of polishing.
+/// Number of refining rounds.
 pub(super) const POLISHES: usize = POLISH.len();
 
-/// Improves a trajectory; it may exceed limits a little.
+/// Improves a trajectory; the result may exceed limits slightly.
 pub(super) fn improve(
     measure: &TrajectoryEvaluator<'_>,
     start: &[FourierSeries],
@@ -48,7 +50,7 @@ pub(super) fn improve(
     scales.decode(&x)
 }
 
-/// Improves a trajectory that was improved before: closer to the limits.
+/// Refines an improved trajectory with sharper constraints, closer to the limits.
 pub(super) fn polish(
     measure: &TrajectoryEvaluator<'_>,
     start: &[FourierSeries],
@@ -62,6 +64,7 @@ pub(super) fn polish(
     scales.decode(&x)
 }
 
+/// One run of the optimiser with a sharpness of the constraints; returns the coefficients at its end.
 fn optimise_round(
     measure: &TrajectoryEvaluator<'_>,
     scales: &CoefficientScales<'_, '_>,
@@ -69,11 +72,12 @@ fn optimise_round(
     sharpness: f64,
     progress: &dyn Fn(usize) -> SearchFlow,
 ) -> Vec<f64> {
+    // Objective and constraints are requested one by one; they are computed together and kept for the point.
     let known: RefCell<Option<ConstraintLinearisation>> = RefCell::new(None);
     let flow = Cell::new(SearchFlow::Continue(()));
     let entry = |x: &[f64], k: usize, gradient: Option<&mut [f64]>| -> f64 {
         if flow.get().is_break() {
-            // Where nothing changes any more, the search ends by itself.
+            // With zero gradients the optimiser ends by itself.
             if let Some(gradient) = gradient {
                 gradient.fill(0.0);
             }
@@ -100,6 +104,7 @@ fn optimise_round(
         move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient)
     };
     let constraints: Vec<_> = (1..=n_constraints).map(constraint).collect();
+    // Coefficients of size 1 reach a limit; four times that is far beyond.
     let bounds = vec![(-4.0, 4.0); start.len()];
     let tolerances = StopTols {
         ftol_rel: 1e-6,
@@ -124,7 +129,7 @@ fn optimise_round(
     }
 }
 
-/// Values and central differences.
+/// Objective and constraints at a point, with gradients by central differences.
 fn linearise(
     measure: &TrajectoryEvaluator<'_>,
     scales: &CoefficientScales<'_, '_>,
@@ -157,7 +162,7 @@ fn linearise(
     }
 }
 
-/// The objective, then all constraints.
+/// The objective, then all constraints (not above 0 inside the limits), at a point.
 fn objective_and_constraints(
     measure: &TrajectoryEvaluator<'_>,
     scales: &CoefficientScales<'_, '_>,
@@ -190,7 +195,7 @@ fn objective_and_constraints(
     values
 }
 
-/// Smooth, and never below the largest value.
+/// Smooth maximum, never below the largest value.
 fn smooth_largest(values: impl Iterator<Item = f64> + Clone, sharpness: f64) -> f64 {
     let largest = values.clone().fold(f64::NEG_INFINITY, f64::max);
     if !largest.is_finite() {
@@ -200,14 +205,16 @@ fn smooth_largest(values: impl Iterator<Item = f64> + Clone, sharpness: f64) -> 
     largest + sum.ln() / sharpness
 }
 
-/// What makes coefficients of size 1 out of those of a series.
+/// Scales between coefficients of size 1 and those of a series.
 struct CoefficientScales<'m, 'a> {
+    /// Limits and options.
     measure: &'m TrajectoryEvaluator<'a>,
-    /// Amplitude of each harmonic that one limit or another allows, for each coordinate.
+    /// Largest amplitude of each harmonic within the tightest limit, `[coordinate][harmonic]`, rad or m.
     amplitudes: Vec<Vec<f64>>,
 }
 
 impl<'m, 'a> CoefficientScales<'m, 'a> {
+    /// Amplitudes from the limits of position, rate and acceleration.
     fn new(measure: &'m TrajectoryEvaluator<'a>) -> Self {
         let amplitudes = measure.limits.iter().map(|limits| {
             let harmonics = 1..=measure.options.harmonics;
@@ -230,6 +237,7 @@ impl<'m, 'a> CoefficientScales<'m, 'a> {
         }
     }
 
+    /// Coefficients of size 1 for some series: for each coordinate the mean, then sines and cosines.
     fn encode(&self, series: &[FourierSeries]) -> Vec<f64> {
         let mut x = Vec::new();
         for (i, one) in series.iter().enumerate() {
@@ -245,6 +253,7 @@ impl<'m, 'a> CoefficientScales<'m, 'a> {
         x
     }
 
+    /// The series of some coefficients; the inverse of `encode`.
     fn decode(&self, x: &[f64]) -> Vec<FourierSeries> {
         let n = self.measure.options.harmonics;
         let omega = self.measure.omega();

@@ -1,4 +1,4 @@
-//! What can be wrong with the file of a fit, each with what to do.
+//! Faults of a fit file, each with a remedy.
 
 use std::fmt;
 
@@ -22,7 +22,7 @@ pub struct FitFileError {
 pub enum FitFault {
     /// The file cannot be opened or read.
     Unreadable {
-        /// The operating system's words.
+        /// Message of the operating system.
         reason: String,
     },
     /// The text is not the JSON of `identify`.
@@ -34,39 +34,39 @@ pub enum FitFault {
         /// What is wrong there.
         reason: String,
     },
-    /// The text does not begin as JSON does: a recording or a model file, perhaps.
+    /// The text is not JSON: possibly a recording or a model file.
     NoJson,
     /// A parameter of the model is not in the file.
     MissingParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
         /// The closest name in the file.
         nearest: Option<String>,
         /// The names in the file.
         present: Vec<String>,
     },
-    /// The file holds parameters that the model does not have.
+    /// The file has parameters that the model does not have.
     UnknownParameters {
-        /// Those parameters.
+        /// Names of these parameters.
         names: Vec<String>,
     },
-    /// The file holds a parameter twice.
+    /// The file has a parameter twice.
     DuplicateParameter {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
-    /// A constant that an expression of the base parameters holds has another value.
+    /// A constant in an expression of the base parameters has another value.
     ConstantDiffers {
-        /// The constant.
+        /// Name of the constant.
         name: String,
         /// Its value in the file.
         file: f64,
         /// Its value in the model.
         model: f64,
     },
-    /// A parameter has the same name but stands for another expression.
+    /// A parameter has the same name but another expression.
     ExpressionDiffers {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
         /// The expression in the file.
         file: String,
@@ -82,7 +82,7 @@ impl FitFileError {
         let identify = Remedy::command(CommandName::Identify);
         match &self.fault {
             FitFault::Unreadable { reason } => message!(
-                "{file}: the fit cannot be read: {reason}; make it with {} ({})",
+                "{file}: the fit cannot be read: {reason}; create it with {} ({})",
                 identify,
                 Remedy::option(OptionName::Out).with_value(file)
             ),
@@ -96,7 +96,7 @@ impl FitFileError {
                 identify
             ),
             FitFault::NoJson => message!(
-                "{file} is no fit: the JSON that {} writes is expected; recordings go to {}",
+                "{file} is not a fit: the JSON that {} writes is expected; pass recordings to {}",
                 identify,
                 Remedy::option(OptionName::Data)
             ),
@@ -109,17 +109,17 @@ impl FitFileError {
                     .as_ref()
                     .map(|near| format!(" (the closest is `{near}`)"));
                 message!(
-                    "{file}: the model's parameter `{name}` is not in the fit{}, which holds {}; identify this model again",
+                    "{file}: the model's parameter `{name}` is not in the fit{}, which has {}; identify this model again",
                     nearest.unwrap_or_default(),
                     backquoted_list(present)
                 )
             }
             FitFault::UnknownParameters { names } => message!(
-                "{file}: the fit holds {}, which the model does not have; identify this model again",
+                "{file}: the fit has {}, which the model does not have; identify this model again",
                 backquoted_list(names)
             ),
             FitFault::DuplicateParameter { name } => {
-                message!("{file}: the fit holds `{name}` twice; remove one")
+                message!("{file}: the fit has `{name}` twice; remove one")
             }
             FitFault::ConstantDiffers {
                 name,

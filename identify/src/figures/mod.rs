@@ -1,49 +1,49 @@
-//! Error figures: measured and model forces go in, the numbers of a comparison come out, as
-//! `identify` and `compare` print them.
+//! Error figures. Input: measured and model forces; output: the numbers of a comparison as `identify` and `compare`
+//! print them.
 //!
-//! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels
-//! stacked for the total. `mean_relative` is the paper's mean of `|error| / |measured|`, whose
-//! peaks where the measured force passes through zero are the reason to read `nrms` beside it.
+//! `nrms` is `|measured - model| / |measured|` in the 2-norm over the samples, all channels stacked for the total.
+//! `mean_relative` is the paper's mean of `|error| / |measured|`; it has peaks where the measured force passes through
+//! zero, so `nrms` is given too.
 //! `abs_ratio` is `sum |error| / sum |measured|`, as Volkmann et al. (IEEE ICMA 2020) give it.
-//! Figures are of every sample as it was recorded, whatever a fit was made from; beside them stand those after one low-pass
-//! on both forces ([`FilteredFigures`]), which do not count the noise of the force above the motion.
+//! Figures are of every recorded sample, however the fit was computed. In addition there are figures after one low-pass
+//! on both forces ([`FilteredFigures`]), which exclude the noise of the force above the motion.
 
 mod filtered;
 mod fit_error;
 mod fit_file;
 mod locate;
+mod thresholds;
 
 use std::fmt;
 
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
-pub use filtered::{
-    BandError, FilteredChannelFigures, FilteredFigures, TRIMMED_PART, add_filtered_forces,
-};
+pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
 pub use fit_file::{
     EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters,
 };
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
+pub use thresholds::TRIMMED_PART;
 
 /// Error figures of a comparison.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorFigures {
-    /// Relative error over all channels stacked; absent when nothing but zero was measured, and where channels have different
-    /// units, whose squares have no sum.
+    /// Relative error over all channels stacked; absent if all measured values are zero, and if channels have different
+    /// units, whose squares cannot be added.
     pub nrms: Option<f64>,
-    /// Root mean square of the error over all channels, in the unit of the forces; absent where channels have different units.
+    /// Rms error over all channels, in the unit of the forces; absent if channels have different units.
     #[serde(default)]
     pub rms: Option<f64>,
-    /// Samples, each of all channels.
+    /// Number of samples, each of all channels.
     pub samples: usize,
     /// The figures of each channel, in the order of the drives.
     pub channels: IndexMap<String, ChannelFigures>,
-    /// Measured and model force through the same low-pass.
+    /// Figures after the same low-pass on measured and model force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<FilteredFigures>,
-    /// The rows that the fit was made from, where these are not the samples: forces after the parallel filter, fewer of them.
+    /// Figures of the rows of the fit, if these are not the samples: after the parallel filter and decimation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<FilteredFigures>,
 }
@@ -51,25 +51,24 @@ pub struct ErrorFigures {
 /// Error figures of one channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChannelFigures {
-    /// Relative error; absent when nothing but zero was measured.
+    /// Relative error; absent if all measured values are zero.
     pub nrms: Option<f64>,
-    /// Mean of `|error| / |measured|` over samples with a measured value other than zero;
-    /// absent when there are none.
+    /// Mean of `|error| / |measured|` over samples with a measured value other than zero; absent if there are none.
     pub mean_relative: Option<f64>,
-    /// `sum |error| / sum |measured|`; absent when nothing but zero was measured.
+    /// `sum |error| / sum |measured|`; absent if all measured values are zero.
     #[serde(default)]
     pub abs_ratio: Option<f64>,
     /// Largest `|error|`, in the unit of the force.
     pub max_abs: f64,
-    /// Root mean square of the error, in the unit of the force.
+    /// Rms error, in the unit of the force.
     pub rms: f64,
-    /// The unit of the force; empty where it is not known.
+    /// The unit of the force; empty if it is not known.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Samples whose force was not measured, or is told apart as a fault of the sensor; no figure counts them.
+    /// Number of samples whose force was not measured or is a detected sensor fault; no figure includes them.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub not_counted: usize,
-    /// Samples that `mean_relative` leaves out because exactly zero was measured.
+    /// Number of samples that `mean_relative` leaves out because exactly zero was measured.
     pub zero_measured: usize,
 }
 
@@ -77,20 +76,20 @@ pub struct ChannelFigures {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum FiguresError {
-    /// Measured and model values differ in number, or are no whole samples of the channels.
+    /// Measured and model values differ in number, or are not complete samples of the channels.
     Shape {
-        /// Measured values.
+        /// Number of measured values.
         measured: usize,
-        /// Model values.
+        /// Number of model values.
         model: usize,
-        /// Channels.
+        /// Number of channels.
         channels: usize,
     },
     /// A value is NaN or infinite.
     NotFinite {
-        /// The channel.
+        /// Name of the channel.
         channel: String,
-        /// The sample, from 0.
+        /// Index of the sample, from 0.
         sample: usize,
     },
     /// No samples were given.
@@ -106,12 +105,12 @@ impl fmt::Display for FiguresError {
                 channels,
             } => write!(
                 f,
-                "{measured} measured and {model} model values are no matching samples of {channels} channels"
+                "{measured} measured and {model} model values differ in number, or are not complete samples of {channels} channels"
             ),
             Self::NotFinite { channel, sample } => write!(
                 f,
                 "the measured or the model force of `{channel}` is not finite in sample {sample}; \
-                 is the mechanism out of reach or singular there?"
+                 check whether the mechanism is out of reach or singular there"
             ),
             Self::NoSamples => f.write_str("there are no samples to compare"),
         }
@@ -120,11 +119,11 @@ impl fmt::Display for FiguresError {
 
 impl std::error::Error for FiguresError {}
 
-/// Takes samples block by block; its memory does not depend on their number.
+/// Accumulates errors block by block; its memory does not depend on the number of samples.
 ///
 /// ```
-/// use modelmill_identify::Comparison;
-/// let mut comparison = Comparison::new(["left".to_owned(), "right".to_owned()]);
+/// use modelmill_identify::ErrorAccumulator;
+/// let mut comparison = ErrorAccumulator::new(["left".to_owned(), "right".to_owned()]);
 /// comparison.add(&[3.0, 4.0], &[3.0, 5.0])?;
 /// let figures = comparison.finish()?;
 /// assert_eq!(figures.nrms, Some(0.2));
@@ -137,14 +136,21 @@ pub struct ErrorAccumulator {
     samples: usize,
 }
 
+/// Sums over the samples of one channel.
 #[derive(Debug, Clone, Default)]
 struct ChannelErrorSums {
     unit: String,
+    /// Samples that do not count.
     not_counted: usize,
+    /// Sum of squared errors.
     error: f64,
+    /// Sum of squared measured values.
     measured: f64,
+    /// Sum of `|error| / |measured|`.
     relative: f64,
+    /// Sum of `|error|`.
     abs_error: f64,
+    /// Sum of `|measured|`.
     abs_measured: f64,
     max_abs: f64,
     zero_measured: usize,
@@ -171,13 +177,13 @@ impl ErrorAccumulator {
         self
     }
 
-    /// Takes whole samples, interleaved `[sample * n_channels + channel]`.
-    /// Fails when the lengths do not fit or a value is not finite.
+    /// Adds complete samples, interleaved `[sample * n_channels + channel]`. Fails if the lengths do not match or a
+    /// value is not finite.
     pub fn add(&mut self, measured: &[f64], model: &[f64]) -> Result<(), FiguresError> {
         self.add_counted(measured, model, |_, _| true)
     }
 
-    /// The same, of which only those values count of which `counts(sample, channel)` says so.
+    /// The same, but only values for which `counts(sample, channel)` is true are included.
     pub fn add_counted(
         &mut self,
         measured: &[f64],
@@ -226,7 +232,7 @@ impl ErrorAccumulator {
         Ok(())
     }
 
-    /// The figures of all samples taken; fails when there were none.
+    /// The figures of all added samples; fails if there are none.
     pub fn finish(&self) -> Result<ErrorFigures, FiguresError> {
         if self.samples == 0 {
             return Err(FiguresError::NoSamples);
@@ -266,13 +272,13 @@ impl ErrorAccumulator {
     }
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde asks")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires it")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// Figures of whole columns, `measured[channel][sample]` and `model[channel][sample]`.
-/// Fails when the shapes differ, a value is not finite or there are no samples.
+/// Figures of complete columns, `measured[channel][sample]` and `model[channel][sample]`. Fails if the shapes differ, a
+/// value is not finite or there are no samples.
 pub fn compare_forces(
     channels: &[String],
     measured: &[Vec<f64>],

@@ -1,10 +1,10 @@
-//! All real solutions of a system of polynomial equations that has finitely many: a Groebner basis goes in, points in
-//! floating point come out, each the nearest to an exact solution.
+//! All real solutions of a system of polynomial equations with finitely many solutions. Input: polynomials; output:
+//! points in floating point, each the nearest to an exact solution.
 //!
-//! Multiplication by a linear form acts on the quotient ring; where its minimal polynomial has as many roots as the
-//! ring has dimensions, each solution's coordinates are polynomials in the form's value (the shape lemma:
-//! D. Cox, J. Little, D. O'Shea, "Using Algebraic Geometry", 2.4). Multiple solutions are made simple by
-//! A. Seidenberg's lemma (1974) first.
+//! Multiplication by a linear form acts on the quotient ring. If its minimal polynomial has as many roots as the ring
+//! has dimensions, the coordinates of each solution are polynomials in the value of the form (the shape lemma: D. Cox,
+//! J. Little, D. O'Shea, "Using Algebraic Geometry", 2.4). Multiple solutions are made simple first by A. Seidenberg's
+//! lemma (1974).
 
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
@@ -18,11 +18,11 @@ use modelmill_algebra::real_roots::{
     squarefree_part,
 };
 
-/// Most complex solutions of a system.
+/// Largest number of complex solutions of a system.
 const MOST_SOLUTIONS: usize = 64;
-/// Linear forms that are tried before solutions are taken for multiple ones.
+/// Number of linear forms that are tried before solutions are assumed to be multiple.
 const FORMS: i64 = 6;
-/// Halvings of a root's interval: far below what any number in floating point could tell.
+/// Largest number of halvings of a root's interval, far below the resolution of floating point.
 const MOST_HALVINGS: usize = 2000;
 
 /// The solutions of a system.
@@ -34,7 +34,7 @@ pub(crate) enum RealSolutions {
     Infinite,
 }
 
-/// Solves equations `polynomial = 0` in `n` unknowns.
+/// Solves equations `polynomial = 0` in `n` unknowns; an error if the computation is too large.
 pub(crate) fn solve(
     equations: &[Polynomial],
     n: usize,
@@ -46,6 +46,7 @@ pub(crate) fn solve(
         if has_no_solution(&basis) {
             return Ok(RealSolutions::Finite(Vec::new()));
         }
+        // Monomials that are a basis of the quotient ring; their number is that of complex solutions.
         let Some(terms) = standard_terms(&basis, n, MOST_SOLUTIONS)? else {
             return Ok(RealSolutions::Infinite);
         };
@@ -53,6 +54,7 @@ pub(crate) fn solve(
             basis: &basis,
             terms: &terms,
         };
+        // A form that separates all solutions gives the answer.
         for k in 1..=FORMS {
             if let Some(shape) = ring.solve_shape_lemma(k, &mut work)? {
                 return Ok(RealSolutions::Finite(shape.points()));
@@ -61,6 +63,7 @@ pub(crate) fn solve(
         if is_radical {
             return Err(GroebnerLimitExceeded);
         }
+        // Add the squarefree part of each unknown's minimal polynomial, which makes multiple solutions simple.
         let mut more = basis.clone();
         for i in 0..n {
             let minimal = ring.minimal_polynomial(&unknown_polynomial(n, i), &mut work)?;
@@ -76,19 +79,24 @@ pub(crate) fn solve(
     }
 }
 
-/// Polynomials modulo the equations.
+/// The quotient ring: polynomials modulo the equations.
 struct QuotientRing<'a> {
+    /// Groebner basis of the equations.
     basis: &'a [Polynomial],
+    /// Monomials that span the ring.
     terms: &'a [TermExponents],
 }
 
-/// The solutions as values of polynomials at the roots of one.
+/// The solutions: each real root of one polynomial gives the coordinates by further polynomials.
 struct ShapeLemmaSolution {
+    /// Minimal polynomial of the linear form; its roots are the values of the form.
     minimal: UnivariatePolynomial,
+    /// Each coordinate as a polynomial in the value of the form.
     coordinates: Vec<UnivariatePolynomial>,
 }
 
 impl QuotientRing<'_> {
+    /// Coefficients of a reduced polynomial for the monomials of the ring.
     fn vector(&self, polynomial: &Polynomial) -> Vec<BigRational> {
         let factor = |term| polynomial.terms.get(term).cloned();
         let terms = self.terms.iter();
@@ -97,7 +105,7 @@ impl QuotientRing<'_> {
             .collect()
     }
 
-    /// 1, form, form^2, ... up to one power more than there are dimensions.
+    /// The powers 1, form, form^2, ... as vectors, one more than there are dimensions.
     fn powers(
         &self,
         form: &Polynomial,
@@ -119,13 +127,14 @@ impl QuotientRing<'_> {
         Ok(vectors)
     }
 
-    /// The least polynomial that vanishes for the form, modulo the equations.
+    /// Monic polynomial of least degree that is zero for the form, modulo the equations.
     fn minimal_polynomial(
         &self,
         form: &Polynomial,
         work: &mut GroebnerWork,
     ) -> Result<UnivariatePolynomial, GroebnerLimitExceeded> {
         let powers = self.powers(form, work)?;
+        // The first power that is a combination of lower ones gives the polynomial.
         for k in 1..powers.len() {
             if let Some(mut factors) = solve_combinations(&powers[..k], &[&powers[k]]) {
                 let mut minimal: UnivariatePolynomial =
@@ -137,7 +146,7 @@ impl QuotientRing<'_> {
         unreachable!("more vectors than dimensions are dependent")
     }
 
-    /// The shape of the solutions for a linear form, if the form tells all of them apart.
+    /// The solutions by the shape lemma for the k-th linear form; `None` if the form does not separate all solutions.
     fn solve_shape_lemma(
         &self,
         k: i64,
@@ -145,6 +154,7 @@ impl QuotientRing<'_> {
     ) -> Result<Option<ShapeLemmaSolution>, GroebnerLimitExceeded> {
         let n = self.basis[0].n;
         let mut form = Polynomial::new(n);
+        // Integer weights of the unknowns, different for each k.
         let mut weight = 1_i64;
         for i in 0..n {
             form.add(
@@ -155,6 +165,7 @@ impl QuotientRing<'_> {
         }
         let mut powers = self.powers(&form, work)?;
         let last = powers.pop().expect("at least one power");
+        // The highest power and all coordinates as combinations of lower powers.
         let mut targets = vec![last];
         for i in 0..n {
             let coordinate = remainder(&unknown_polynomial(n, i), self.basis, work)?;
@@ -174,6 +185,7 @@ impl QuotientRing<'_> {
 }
 
 impl ShapeLemmaSolution {
+    /// All real solutions in floating point.
     fn points(&self) -> Vec<Vec<f64>> {
         isolate_roots(&self.minimal)
             .into_iter()
@@ -181,8 +193,9 @@ impl ShapeLemmaSolution {
             .collect()
     }
 
-    /// A solution: the root's interval is halved until every coordinate is known to the last bit.
+    /// One solution: the interval of the root is halved until every coordinate is known to the last bit.
     fn refine_point(&self, mut root: RationalInterval) -> Vec<f64> {
+        // Relative accuracy of 2^-60, or absolute 2^-1000 for a coordinate near zero.
         let fine = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 60);
         let tiny = BigRational::new(1.into(), num_bigint::BigInt::from(1) << 1000);
         for _ in 0..MOST_HALVINGS {
@@ -194,7 +207,7 @@ impl ShapeLemmaSolution {
             if all_known {
                 break;
             }
-            // Some bits more between two looks: looking costs more than halving.
+            // Several halvings between two tests, since a test costs more than a halving.
             for _ in 0..16 {
                 halve_interval(&self.minimal, &mut root);
             }
@@ -204,7 +217,8 @@ impl ShapeLemmaSolution {
     }
 }
 
-/// Each target as a combination of vectors; `None` unless the vectors are independent and span all targets.
+/// Each target as a combination of vectors, by Gauss-Jordan elimination. `None` unless the vectors are independent and
+/// span all targets.
 fn solve_combinations(
     vectors: &[Vec<BigRational>],
     targets: &[&Vec<BigRational>],
@@ -234,6 +248,7 @@ fn solve_combinations(
             }
         }
     }
+    // Rows below the pivots must vanish, or a target is outside of the span.
     let spans = matrix[columns..]
         .iter()
         .all(|row| row[columns..].iter().all(Zero::is_zero));
@@ -301,7 +316,7 @@ mod tests {
         let found = sorted(solve(&double, 2).unwrap());
         let root = 2.0_f64.sqrt();
         assert_eq!(found, [[2.0, -root], [2.0, root]]);
-        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 leaves a curve.
+        // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 is a curve.
         let complex = system(1, &[&[(1.0, &[(0, 2)]), (1.0, &[])]]);
         assert_eq!(sorted(solve(&complex, 1).unwrap()), Vec::<Vec<f64>>::new());
         let contradiction = system(

@@ -1,8 +1,10 @@
+//! Tests of interpretation with small systems whose solutions are known.
 use super::*;
 
 /// `sum of factor * product of powers` for each equation.
 type Equations<'a> = &'a [&'a [(f64, &'a [(usize, u32)])]];
 
+/// A problem with `n` unknowns, equal standard deviations, and nominal values of 1.
 fn system(
     n: usize,
     equations: Equations<'_>,

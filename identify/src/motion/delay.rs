@@ -1,8 +1,8 @@
-//! Forces that are read later than they act: the states of a run are taken that much earlier.
+//! Delayed force signals: the states of a run are taken earlier by the delay.
 //!
-//! The forces keep their samples, noise and jumps included; states are smooth, so that they can be read off between samples
-//! by the cubic through the four nearest (Lagrange). A sample whose states would lie before the first or behind the last
-//! one has no partner and is dropped.
+//! The forces keep their samples with noise and jumps. States are smooth, so that they can be interpolated by the
+//! cubic through the four nearest samples (Lagrange). A sample whose states would lie outside of the recording is
+//! dropped.
 //!
 //! Decision: the states are shifted and not the forces, because states are smooth while forces jump at reversals
 //! and are noisy.
@@ -10,22 +10,23 @@
 use crate::motion::run::PreparedRun;
 
 impl PreparedRun {
-    /// Pairs every force with the states `delay` seconds before it was read, and gives how many samples at the start and at
-    /// the end are dropped for lack of states. A negative delay pairs it with later ones.
+    /// Pairs every force with the states `delay` seconds before it. Returns how many samples at the start and at the
+    /// end are dropped because states are missing. A negative delay pairs it with later states.
     ///
-    /// `None` leaves the run as it is: fewer than four samples would be left.
+    /// `None` leaves the run unchanged, because fewer than four samples would remain.
     pub fn shift_states_by_delay(&mut self, delay: f64) -> Option<(usize, usize)> {
         let n = self.time.len();
         let (Some(&first), Some(&last)) = (self.time.first(), self.time.last()) else {
             return None;
         };
-        // A delay by whole samples must not fail by rounding.
+        // A delay of a multiple of the sampling time must not fail by rounding.
         let slack = 1e-9 * (last - first);
         let start = self.time.partition_point(|t| t - delay < first - slack);
         let end = self.time.partition_point(|t| t - delay <= last + slack);
         if n < 4 || end < start + 4 {
             return None;
         }
+        // Weights for each remaining sample; the same for all coordinates.
         let stencils: Vec<(usize, [f64; 4])> = self.time[start..end]
             .iter()
             .map(|t| cubic_stencil(&self.time, t - delay))
@@ -37,6 +38,7 @@ impl PreparedRun {
                 .map(|(at, weights)| (0..4).map(|k| weights[k] * column[at + k]).sum())
                 .collect();
         }
+        // Times, forces and lines keep their values, but lose the dropped samples.
         let cut = |column: &mut Vec<f64>| {
             column.truncate(end);
             column.drain(..start);
@@ -53,7 +55,7 @@ impl PreparedRun {
     }
 }
 
-/// The first of the four samples around a time, and their weights in the cubic through them.
+/// Index of the first of the four samples around a time, and their weights in the cubic through them.
 fn cubic_stencil(time: &[f64], at: f64) -> (usize, [f64; 4]) {
     let above = time.partition_point(|t| *t < at);
     let first = above.saturating_sub(2).min(time.len() - 4);

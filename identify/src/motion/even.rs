@@ -1,27 +1,26 @@
-//! Samples at uneven times on even ones, and back: times and values go in; the cubic spline through them, read off anywhere,
-//! comes out.
+//! Interpolation between uneven and even times: times and values go in; values of the cubic spline through them come
+//! out.
 //!
-//! A filter of even steps takes a sample that was read late for motion. The spline through the samples at their true times
-//! moves with them, and its error is of the fourth order of the step, far below what a filter of the motion's band leaves.
-//! Source: C. de Boor, "A Practical Guide to Splines" (1978), chapter IV, with the ends not bent.
+//! A filter for even steps treats an error of a sample's time as motion. The spline through the samples at their true
+//! times has an error of fourth order in the step, far below that of a filter. Source: C. de Boor, "A Practical Guide
+//! to Splines" (1978), chapter IV, with second derivatives of zero at the ends.
 
-/// Stamps that are no further off an even grid than this part of a step are even.
-const OFF_GRID: f64 = 1e-4;
-/// Decimals that stamps may be rounded to.
-const MOST_DECIMALS: i32 = 9;
+use crate::motion::thresholds::{
+    EVEN_TIMES_TOLERANCE, ROUNDED_MOST_DECIMALS, ROUNDED_TIMES_TOLERANCE,
+};
 
-/// How samples stand in time.
+/// How the times of samples are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum SampleSpacing {
     /// At even times.
     Even,
-    /// At even times, whose stamps are rounded to as many decimals as they have.
+    /// At even times that were rounded to their number of decimals.
     Rounded,
     /// At uneven times.
     Uneven,
 }
 
-/// How samples stand in time, as far as their stamps can tell.
+/// How the times of samples are spaced, as far as they show it.
 pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     let n = time.len();
     if n < 3 {
@@ -29,8 +28,9 @@ pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     }
     let grid = even_times(time);
     let step = (grid[n - 1] - grid[0]) / (n - 1) as f64;
+    // The largest difference from the even grid decides.
     let off = (time.iter().zip(&grid)).fold(0.0_f64, |most, (t, even)| most.max((t - even).abs()));
-    if off <= OFF_GRID * step {
+    if off <= EVEN_TIMES_TOLERANCE * step {
         SampleSpacing::Even
     } else if off <= timestamp_resolution(time) {
         SampleSpacing::Rounded
@@ -39,12 +39,12 @@ pub(crate) fn sample_spacing(time: &[f64]) -> SampleSpacing {
     }
 }
 
-/// Whether the steps are even but for rounding.
+/// Whether the steps are even, except for rounding.
 pub(crate) fn is_even(time: &[f64]) -> bool {
     sample_spacing(time) != SampleSpacing::Uneven
 }
 
-/// Half of the last decimal that any of the stamps has; 0 where they have more than are written.
+/// Half a unit of the last decimal of the times; 0 if they have more than [`ROUNDED_MOST_DECIMALS`].
 fn timestamp_resolution(time: &[f64]) -> f64 {
     let has = |decimals: i32| {
         let scale = 10.0_f64.powi(decimals);
@@ -52,13 +52,15 @@ fn timestamp_resolution(time: &[f64]) -> f64 {
             |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
         time.iter().all(is_whole)
     };
-    (0..=MOST_DECIMALS)
+    (0..=ROUNDED_MOST_DECIMALS)
         .find(|decimals| has(*decimals))
-        // The line through rounded stamps is itself a little off.
-        .map_or(0.0, |decimals| 0.55 * 10.0_f64.powi(-decimals))
+        // The line through rounded times has a small error itself.
+        .map_or(0.0, |decimals| {
+            ROUNDED_TIMES_TOLERANCE * 10.0_f64.powi(-decimals)
+        })
 }
 
-/// As many even times as there are stamps, on the line that comes closest to them.
+/// As many even times as there are samples, on the least squares line through their times.
 pub(crate) fn even_times(time: &[f64]) -> Vec<f64> {
     let n = time.len() as f64;
     let mean = time.iter().sum::<f64>() / n;
@@ -75,28 +77,30 @@ pub(crate) fn even_times(time: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Even times from the first stamp to the last, as many as there are stamps.
+/// As many even times as there are samples, from the first time to the last.
 pub(crate) fn spread_times(time: &[f64]) -> Vec<f64> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n.max(2) - 1) as f64;
     (0..n).map(|k| time[0] + step * k as f64).collect()
 }
 
-/// The values at [`spread_times`].
+/// The values of the spline at [`spread_times`].
 pub(crate) fn resample_evenly(time: &[f64], values: &[f64]) -> Vec<f64> {
     CubicSpline::new(time, values).evaluate_at(&spread_times(time))
 }
 
-/// The cubic spline through some samples.
+/// The cubic spline through samples.
 pub(crate) struct CubicSpline<'a> {
+    /// Times of the samples, s.
     time: &'a [f64],
+    /// Values of the samples.
     values: &'a [f64],
     /// Second derivatives at the samples.
     second_derivatives: Vec<f64>,
 }
 
 impl<'a> CubicSpline<'a> {
-    /// Times must increase; there must be as many values (asserted).
+    /// Computes the spline. Times must increase; panics unless there are as many values.
     pub(crate) fn new(time: &'a [f64], values: &'a [f64]) -> Self {
         assert_eq!(time.len(), values.len(), "one value per time");
         let n = time.len();
@@ -123,13 +127,14 @@ impl<'a> CubicSpline<'a> {
         }
     }
 
-    /// The values at some times, which must not decrease; beyond the ends the end pieces go on.
+    /// Values at times that must not decrease. Outside of the samples the first or last piece is continued.
     pub(crate) fn evaluate_at(&self, times: &[f64]) -> Vec<f64> {
         let n = self.time.len();
         if n < 2 {
             return vec![self.values.first().copied().unwrap_or(0.0); times.len()];
         }
         let mut i = 0;
+        // Move to the piece that contains the time.
         let at = |t: &f64| {
             while i + 2 < n && self.time[i + 1] <= *t {
                 i += 1;

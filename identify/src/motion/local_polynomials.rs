@@ -1,6 +1,7 @@
-//! Savitzky-Golay: the polynomial that fits best around each sample gives its smoothed position, rate and acceleration.
+//! Savitzky-Golay filter: the polynomial that fits best around each sample gives its smoothed position, rate and
+//! acceleration.
 //!
-//! The fit is made on the true times, so that uneven steps do no harm; at the ends the window stays inside the
+//! The fit uses the recorded times, so that uneven steps are allowed. At the ends the window stays inside of the
 //! recording. Sources: A. Savitzky, M. J. E. Golay, Analytical Chemistry 36 (1964); R. W. Schafer, "What is a
 //! Savitzky-Golay filter?", IEEE Signal Processing Magazine 28 (2011), for the cut-off.
 
@@ -9,18 +10,20 @@ use nalgebra::{SMatrix, SVector};
 use crate::motion::derivatives::SmoothedCoordinate;
 use crate::signal::float_to_count;
 
-/// Degree of the polynomials: the lowest whose second derivative is smooth to second order.
+/// Degree of the polynomials: the lowest with a second derivative that is smooth to second order.
 pub(crate) const DEGREE: usize = 4;
+/// Number of coefficients of a polynomial.
 const TERMS: usize = DEGREE + 1;
 
-/// Samples to either side of the window whose cut-off is `cutoff_hz`, at `rate_hz` samples per second;
-/// Schafer's eq. (12), never less than a fit needs.
+/// Samples on each side of the window whose cut-off is `cutoff_hz`, at `rate_hz` samples per second. This is
+/// Schafer's eq. (12), but never less than a fit needs.
 pub(crate) fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
     let width = (TERMS as f64 * 0.5 * rate_hz / cutoff_hz + 4.6) / 3.2;
     float_to_count(width.round()).max(DEGREE)
 }
 
-/// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer.
+/// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer
+/// samples.
 pub(crate) fn smooth_by_polynomials(
     time: &[f64],
     positions: &[f64],
@@ -42,6 +45,7 @@ pub(crate) fn smooth_by_polynomials(
         let scale = 0.5 * (time[start + width - 1] - time[start]);
         let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
         let mut right = SVector::<f64, TERMS>::zeros();
+        // Normal equations of the polynomial around sample i.
         for k in start..start + width {
             let x = (time[k] - time[i]) / scale;
             let mut row = SVector::<f64, TERMS>::repeat(1.0);
@@ -52,6 +56,7 @@ pub(crate) fn smooth_by_polynomials(
             right += row * (positions[k] - positions[i]);
         }
         let polynomial = normal.cholesky()?.solve(&right);
+        // Coefficients of degree 0, 1 and 2 give position, rate and half the acceleration.
         prepared.q.push(positions[i] + polynomial[0]);
         prepared.qd.push(polynomial[1] / scale);
         prepared.qdd.push(2.0 * polynomial[2] / (scale * scale));

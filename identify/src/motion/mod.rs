@@ -1,5 +1,9 @@
-//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a [`Run`] with
-//! its forces.
+//! From recorded columns to states: positions go in; smooth positions, rates and accelerations come out, as a
+//! [`PreparedRun`] with its forces.
+//!
+//! `run` reads the columns, `prepare` selects the smoothing, `smooth` applies it, and `remarks` reports what was
+//! found.
+//! Low-pass: `derivatives` with `cutoff`; polynomials: `local_polynomials`; periodic motions: `periods` and `series`.
 
 mod band;
 mod cutoff;
@@ -16,6 +20,7 @@ mod remarks;
 mod run;
 mod series;
 mod smooth;
+mod thresholds;
 
 pub use decimation::{
     DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time,

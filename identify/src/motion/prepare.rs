@@ -1,6 +1,7 @@
-//! Which way of smoothing suits a recording, and states by it: columns go in, positions with both derivatives come out.
+//! Selects the smoothing that fits a recording, and prepares states with it: columns go in, positions with both
+//! derivatives come out.
 
-use crate::motion::cutoff::{DifferentiatedSignal, LONGEST_TRIM, TRIMMED_PERIODS, choose_cutoff};
+use crate::motion::cutoff::{DifferentiatedSignal, choose_cutoff};
 use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, resample_evenly};
 use crate::motion::options::{SmoothingMethod, StatePreparation};
@@ -8,14 +9,22 @@ use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::run::PreparedRun;
 use crate::motion::series::{self, PeriodicSeries};
 use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
+use crate::motion::thresholds::{
+    CUTOFF_WITHOUT_MOTION_SHARE, PERIOD_LONGEST_DURATIONS, PERIOD_SHORTEST_STEPS,
+    PLANNED_MOST_HARMONICS, TRIM_ONE_IN, TRIMMED_PERIODS,
+};
 use crate::motion::{local_polynomials, periods};
 use crate::recording::{RecordingError, RecordingFault, RecordingNote, SignalRecording};
 use crate::signal::{LowPass, float_to_count};
 use crate::words::backquoted_list;
 
 impl SignalRecording {
-    /// States of all coordinates by the way of smoothing that the preparation asks for, or that suits them; what was
-    /// chosen goes into `prepared` and `notes`.
+    /// States of all coordinates with the requested smoothing, or with the one that fits them. What was chosen is
+    /// added to `prepared` and `notes`.
+    ///
+    /// Returns positions, rates and accelerations of each coordinate. Fails when there are too few samples, or when
+    /// the cut-off
+    /// or the period does not fit the recording.
     pub(crate) fn prepare_states(
         &self,
         time: &[f64],
@@ -24,6 +33,7 @@ impl SignalRecording {
         prepared: &mut PreparationRecord,
         notes: &mut Vec<RecordingNote>,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
+        // Coordinates with both derivatives need no preparation.
         let incomplete: Vec<&RecordedCoordinate<'_>> =
             columns.iter().filter(|c| !c.is_complete()).collect();
         if incomplete.is_empty() {
@@ -35,6 +45,7 @@ impl SignalRecording {
         prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
         let order = preparation.order;
         let rate = mean_rate(time);
+        // Check the number of samples before anything is designed.
         if time.len() < 3 {
             return Err(self.fault(RecordingFault::TooFewSamples {
                 have: time.len(),
@@ -42,6 +53,7 @@ impl SignalRecording {
                 purpose: "preparing derivatives from positions".into(),
             }));
         }
+        // A filter design, with a fault that names the coordinates.
         let design = |cutoff: f64| {
             LowPass::butterworth(order, cutoff, rate).map_err(|error| {
                 self.fault(RecordingFault::Filter {
@@ -59,14 +71,17 @@ impl SignalRecording {
             }));
         }
         let found = find_motion_series(time, columns, preparation);
-        // One cut-off for all coordinates keeps loops consistent.
+        // One cut-off for all coordinates, so that loops stay closed.
         let chosen = || choose_cutoff_for(time, &incomplete, order);
         let cutoff = match &found {
             Some(found) => found.harmonics as f64 / found.period,
-            None => preparation.cutoff_hz.or_else(chosen).unwrap_or(0.1 * rate),
+            None => preparation
+                .cutoff_hz
+                .or_else(chosen)
+                .unwrap_or(CUTOFF_WITHOUT_MOTION_SHARE * rate),
         };
         design(cutoff)?;
-        // A cut-off whose period is longer than the recording leaves nothing of it but a trend.
+        // With a cut-off period longer than the recording only a trend would remain.
         let lowest = rate / time.len() as f64;
         if cutoff < lowest && found.is_none() {
             return Err(self.fault(RecordingFault::CutoffTooLow {
@@ -75,6 +90,7 @@ impl SignalRecording {
                 duration: time.len() as f64 / rate,
             }));
         }
+        // The smoothing: a series that was found, or the requested one with all of its numbers.
         let way = match (preparation.smoothing, &found) {
             (_, Some(found)) => SmoothingFilter::Series {
                 period: found.period,
@@ -86,12 +102,16 @@ impl SignalRecording {
             (SmoothingMethod::SavitzkyGolay, None) => SmoothingFilter::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
+            // A series was requested: its period is given or must be found.
             (SmoothingMethod::Fourier { period }, None) => {
                 let positions: Vec<&[f64]> = columns.iter().map(|c| c.q).collect();
                 let period = period.or_else(|| periods::find_period(time, &positions));
                 let period = period.ok_or_else(|| self.fault(RecordingFault::NoPeriod))?;
                 let duration = time[time.len() - 1] - time[0];
-                let (shortest, longest) = (4.0 / rate, 1.5 * duration);
+                let (shortest, longest) = (
+                    PERIOD_SHORTEST_STEPS / rate,
+                    PERIOD_LONGEST_DURATIONS * duration,
+                );
                 if !(shortest..longest).contains(&period) {
                     return Err(self.fault(RecordingFault::Period {
                         period,
@@ -103,9 +123,10 @@ impl SignalRecording {
                 SmoothingFilter::Series { period, harmonics }
             }
         };
+        // Record what was chosen.
         prepared.cutoff_hz = Some(cutoff);
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
-        // A series has no transients at its ends.
+        // A series has no transients at the ends.
         if !matches!(way, SmoothingFilter::Series { .. }) {
             prepared.trimmed =
                 self.transient_samples(rate / cutoff, time.len(), preparation, notes);
@@ -113,6 +134,7 @@ impl SignalRecording {
         if let SmoothingFilter::Series { period, .. } = way {
             prepared.period = Some(period);
         }
+        // The user is informed about the choice.
         if let Some(found) = &found {
             notes.push(RecordingNote::info(
                 self.describe_series(found, &incomplete),
@@ -126,14 +148,14 @@ impl SignalRecording {
             )));
         }
         let states = self.smooth_columns(time, columns, cutoff, way)?;
-        // Where forces have chosen a series, they have told that what it leaves is no motion.
+        // If forces have chosen the series, they have shown that its residual is not motion.
         if found.is_none() && !preparation.chosen && matches!(way, SmoothingFilter::Series { .. }) {
             self.note_series_residual(columns, &states, notes);
         }
         Ok(states)
     }
 
-    /// All columns smoothed and differentiated in one way.
+    /// All columns smoothed and differentiated with the same filter.
     fn smooth_columns(
         &self,
         time: &[f64],
@@ -161,8 +183,10 @@ impl SignalRecording {
             .collect()
     }
 
-    /// Samples that the filter's transients spoil at both ends, `period` being that of the cut-off
-    /// in samples.
+    /// Number of samples that transients affect at the start and at the end; `period` is that of the cut-off in
+    /// samples.
+    ///
+    /// A recording that is too short to drop them all is reported.
     fn transient_samples(
         &self,
         period: f64,
@@ -170,7 +194,7 @@ impl SignalRecording {
         preparation: &StatePreparation,
         notes: &mut Vec<RecordingNote>,
     ) -> (usize, usize) {
-        let most = float_to_count(samples as f64 / LONGEST_TRIM);
+        let most = float_to_count(samples as f64 / TRIM_ONE_IN);
         let spoilt = (1..most).find(|count| *count as f64 >= TRIMMED_PERIODS * period);
         if spoilt.is_none() && preparation.trim.is_none() {
             notes.push(RecordingNote::warning(format!(
@@ -184,7 +208,7 @@ impl SignalRecording {
     }
 }
 
-/// The cut-off that suits what is to be differentiated, on even times.
+/// The cut-off that fits the columns to be differentiated; uneven samples are interpolated to even times first.
 fn choose_cutoff_for(
     time: &[f64],
     columns: &[&RecordedCoordinate<'_>],
@@ -208,26 +232,23 @@ fn choose_cutoff_for(
     choose_cutoff(&even, rate, order)
 }
 
-/// A series of more harmonics is no plan of a motion, but takes up whatever is there; forces must tell.
-const MANY_HARMONICS: f64 = 25.5;
-
-/// What is open in the preparation of a recording.
+/// The open choices in the preparation of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreparationChoices {
     /// Mean sampling rate, Hz.
     pub rate_hz: f64,
-    /// Up to where forces follow the motion, Hz.
+    /// Highest frequency at which forces follow the motion, Hz.
     pub band_hz: f64,
-    /// The cut-off that the spectra of the positions alone propose, Hz.
+    /// The cut-off that follows from the spectra of the positions only, Hz.
     pub cutoff_hz: f64,
-    /// The period after which the motion repeats itself, s, where it does.
+    /// The period of the motion, s, if it is periodic.
     pub period: Option<f64>,
 }
 
 impl SignalRecording {
-    /// What there is to choose where the preparation leaves cut-off, smoothing and decimation open; `None` where it does not,
-    /// where all derivatives are recorded, where a Fourier series leaves nothing but noise, and where nothing moves.
-    /// Fails as [`Recording::runs_with`] does.
+    /// The choices that the preparation leaves open: cut-off, smoothing and decimation. `None` if they are given, if
+    /// all derivatives are recorded, if a Fourier series has a residual of noise only, or if nothing moves. Fails as
+    /// [`Self::runs_with`] does.
     pub fn find_open_choices(
         &self,
         coordinates: &[String],
@@ -235,18 +256,20 @@ impl SignalRecording {
         preparation: &StatePreparation,
     ) -> Result<Option<PreparationChoices>, RecordingError> {
         let usual = StatePreparation::default();
+        // Any of the three options makes the choice of the user.
         let is_open = preparation.cutoff_hz.is_none()
             && preparation.smoothing == usual.smoothing
             && preparation.decimate <= 1;
         if !is_open {
             return Ok(None);
         }
-        // The band that figures are asked for is none of the motion.
+        // The requested band for figures is not that of the motion.
         let preparation = StatePreparation {
             band_hz: None,
             ..preparation.clone()
         };
         let runs = self.runs_with(coordinates, drives, &preparation)?;
+        // The longest segment represents the recording.
         let longest = runs.iter().max_by_key(|run| run.samples());
         let found = longest.and_then(|run| {
             let prepared = &run.prepared;
@@ -254,10 +277,11 @@ impl SignalRecording {
                 let harmonics = prepared
                     .period
                     .map_or(f64::INFINITY, |period| cutoff * period);
-                harmonics > MANY_HARMONICS
+                harmonics > PLANNED_MOST_HARMONICS
             });
             Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))
         });
+        // A series is an alternative only if the motion has a period.
         Ok(found.map(|(rate_hz, band_hz, cutoff_hz)| {
             let as_series = StatePreparation {
                 smoothing: SmoothingMethod::Fourier { period: None },
@@ -276,7 +300,7 @@ impl SignalRecording {
     }
 }
 
-/// The series of which what is to be differentiated is samples, where the preparation leaves that open.
+/// The Fourier series of the motion, if there is one and the preparation leaves the choice open.
 pub(crate) fn find_motion_series(
     time: &[f64],
     columns: &[RecordedCoordinate<'_>],

@@ -1,7 +1,6 @@
 //! From a recording to states: times, coordinates with their derivatives, and drive forces.
 //!
-//! Derivatives that the file lacks are prepared by [`crate::motion::derivatives`]; every choice that is
-//! made on the way is written into the notes.
+//! Derivatives that the file lacks are prepared by [`crate::motion::prepare`]; the notes state every choice.
 
 use std::fmt::Write as _;
 
@@ -15,24 +14,21 @@ use crate::motion::periods::RunRepeatability;
 use crate::motion::prepare::find_motion_series;
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::smooth::RecordedCoordinate;
+use crate::motion::thresholds::{
+    BRIDGED_GAP_PART, JITTER_LONG_STEPS_PER_SHORT, JITTER_ONE_IN, JITTER_STEP_MARGIN,
+    MISSING_SAMPLE_STEP, SHORT_STEP,
+};
 use crate::recording::{
-    GAP, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
+    GAP_LEAST_STEPS, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
     sample_place_word,
 };
 use crate::signal::median;
 use crate::words::{backquoted_list, count_of};
 
-/// A gap of this part of a period of the highest frequency at which forces follow a motion is bridged by the spline.
-const BRIDGED_GAP_PART: f64 = 0.5;
-/// In a step so many times as long as the usual one samples lack.
-const MISSING_SAMPLE_STEP: f64 = 1.5;
-/// One step in so many is less than half as long as the usual one where times jitter.
-const JITTERS: usize = 100;
-
 /// States along a run, ready for the regressor. All columns have the length of `time`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PreparedRun {
-    /// What messages call the recording.
+    /// Name of the recording in messages.
     pub file: String,
     /// Times, s.
     pub time: Vec<f64>,
@@ -42,27 +38,27 @@ pub struct PreparedRun {
     pub qd: Vec<Vec<f64>>,
     /// `qdd[coordinate][sample]`, rad/s^2 or m/s^2.
     pub qdd: Vec<Vec<f64>>,
-    /// `force[drive][sample]`, N or N m, in the order of the drives that were asked for; `None`
-    /// when the file lacks the force of any drive. See [`Run::measured`].
+    /// `force[drive][sample]`, N or N m, in the order of the requested drives; `None` if the file lacks the force of
+    /// any drive. See [`Self::measured_forces`].
     pub force: Option<Vec<Vec<f64>>>,
     /// Drives whose force the file lacks.
     pub missing_force: Vec<String>,
-    /// `left_out[drive][sample]`: forces that were not measured there, or are told apart as faults of a sensor; what stands
-    /// in their place joins their neighbours. Empty if every force counts.
+    /// `left_out[drive][sample]`: forces that were not measured there, or that were identified as sensor faults.
+    /// Their values are interpolated. Empty if every force counts.
     pub left_out: Vec<Vec<bool>>,
     /// Line in the file for each sample.
     pub lines: Vec<u64>,
-    /// How well the run repeats itself, if its motion is periodic and the forces are known.
+    /// How well the run repeats, if its motion is periodic and the forces are known.
     pub repeatability: Option<RunRepeatability>,
-    /// What was done to the recording.
+    /// How the run was prepared.
     pub prepared: PreparationRecord,
-    /// What the user should know, the recording's own notes included.
+    /// Notes for the user, including those of the recording.
     pub notes: Vec<RecordingNote>,
 }
 
 impl SignalRecording {
-    /// States of the given coordinates and forces of the given drives, with the default
-    /// [`Preparation`]: columns `t`, `NAME`, `NAME_d`, `NAME_dd` and the drive's name.
+    /// States of the given coordinates and forces of the given drives with the default [`StatePreparation`]. The
+    /// columns are `t`, `NAME`, `NAME_d`, `NAME_dd` and the name of the drive.
     pub fn states(
         &self,
         coordinates: &[String],
@@ -71,16 +67,16 @@ impl SignalRecording {
         self.states_with(coordinates, drives, &StatePreparation::default())
     }
 
-    /// [`Recording::states_with`] for each stretch between gaps in time, so that no filter and no difference reaches
-    /// across a gap. Stretches that are too short to be prepared are left out, which the notes say; where nothing is
-    /// to be filtered the recording stays whole.
+    /// [`Self::states_with`] for each segment between gaps in time, so that no filter and no difference extends
+    /// across a gap. Segments that are too short are left out and reported. If nothing is filtered the recording is
+    /// not split.
     pub fn runs_with(
         &self,
         coordinates: &[String],
         drives: &[String],
         preparation: &StatePreparation,
     ) -> Result<Vec<PreparedRun>, RecordingError> {
-        // What is wrong with the whole is said of the whole, before it is cut.
+        // Faults of the complete recording are reported before it is split.
         let wanted = expected_column_names(coordinates, drives);
         let needed: Vec<String> = std::iter::once("t".to_owned())
             .chain(coordinates.iter().cloned())
@@ -95,6 +91,7 @@ impl SignalRecording {
             .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
             .collect();
         let columns = columns?;
+        // Splitting is needed only if a filter would extend across a gap.
         let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
         let time = self.column("t")?;
         let stretches = if is_filtered && !even::is_even(time) {
@@ -104,13 +101,14 @@ impl SignalRecording {
         } else {
             Vec::new()
         };
-        // A series is fitted on the true times, so gaps do it no harm; only decimation would reach across them.
+        // A series is fitted at the true times, so gaps do not matter; only decimation would extend across them.
         let is_whole = stretches.len() < 2
             || preparation.decimate <= 1
                 && find_motion_series(self.column("t")?, &columns, preparation).is_some();
         if is_whole {
             return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
         }
+        // No series was found, so an automatic choice means the low-pass.
         let preparation = &StatePreparation {
             smoothing: match preparation.smoothing {
                 SmoothingMethod::Automatic => SmoothingMethod::Butterworth,
@@ -118,14 +116,16 @@ impl SignalRecording {
             },
             ..preparation.clone()
         };
+        // The longest segment decides about the cut-off.
         let longest = (0..stretches.len()).max_by_key(|i| stretches[*i].samples());
         let longest = longest.unwrap_or(0);
         let first = stretches[longest].states_with(coordinates, drives, preparation)?;
-        // One cut-off for all: that which suits the longest.
+        // All segments have the cut-off of the longest one.
         let preparation = StatePreparation {
             cutoff_hz: preparation.cutoff_hz.or(first.prepared.cutoff_hz),
             ..preparation.clone()
         };
+        // Segments that are too short are counted, all other faults end the preparation.
         let mut runs = Vec::new();
         let (mut short, mut left_out) = (0, 0);
         for (i, stretch) in stretches.iter().enumerate() {
@@ -148,12 +148,13 @@ impl SignalRecording {
                 Err(error) => return Err(error),
             }
         }
+        // The notes of the recording come first, then one on the gaps.
         let mut notes = self.notes().to_vec();
         let breaks = stretches[..stretches.len() - 1].iter();
         let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
         let mut says = format!(
-            "{} has {} in time of more than {GAP} usual steps that {} too long for this motion to be bridged, the first after \
-             line {}: the {} stretches are filtered and differentiated each on its own.",
+            "{} has {} in time of more than {GAP_LEAST_STEPS} usual steps that {} too long for this motion to be bridged, the first after \
+             line {}: the {} segments are filtered and differentiated separately.",
             self.file(),
             count_of(stretches.len() - 1, "gap", "gaps"),
             if stretches.len() == 2 { "is" } else { "are" },
@@ -174,6 +175,7 @@ impl SignalRecording {
             );
         }
         notes.push(RecordingNote::warning(says));
+        // Notes that all segments share are kept for the first one only.
         for (i, run) in runs.iter_mut().enumerate() {
             if i > 0 {
                 run.notes
@@ -187,11 +189,10 @@ impl SignalRecording {
         Ok(runs)
     }
 
-    /// [`Recording::states`] with another preparation.
+    /// [`Self::states`] with another preparation.
     ///
-    /// Fails when a column is missing or unusable, when time does not increase, or when the
-    /// recording is too short for the filter.
-    /// Forces may be missing: `evaluate` needs none.
+    /// Fails when a column is missing or unusable, when time does not increase, or when the recording is too short
+    /// for the filter. Forces may be missing, because not every use needs them.
     pub fn states_with(
         &self,
         coordinates: &[String],
@@ -206,6 +207,7 @@ impl SignalRecording {
         let time = self.column_without_suggesting("t", &wanted)?;
         let mut notes = self.notes().to_vec();
         self.check_time(time, &mut notes)?;
+        // Forces are complete or absent: with one missing force none is used.
         let missing_force: Vec<String> = drives
             .iter()
             .filter(|drive| !self.has_column(drive))
@@ -219,7 +221,7 @@ impl SignalRecording {
             Some(columns?)
         } else {
             notes.push(RecordingNote::info(format!(
-                "{} holds no measured force of {}.",
+                "{} has no column for the force of {}.",
                 self.file(),
                 backquoted_list(&missing_force)
             )));
@@ -230,6 +232,7 @@ impl SignalRecording {
             .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
             .collect();
         let columns = columns?;
+        // Prepare the states, then record band, decimation and trimming.
         let mut prepared = PreparationRecord {
             decimate: preparation.decimate,
             ..PreparationRecord::default()
@@ -241,6 +244,7 @@ impl SignalRecording {
         prepared.decimate_chosen = preparation.chosen;
         prepared.trimmed = preparation.trim.unwrap_or(prepared.trimmed);
         prepared.trim_asked_for = preparation.trim.is_some();
+        // The run with all samples; it is trimmed at the end.
         let mut run = PreparedRun {
             file: self.file().to_owned(),
             time: time.to_vec(),
@@ -266,6 +270,7 @@ impl SignalRecording {
             prepared,
             notes,
         };
+        // Periods are found on the recorded positions before samples are dropped.
         if !preparation.unexamined {
             self.note_repeatability(&columns, drives, &mut run);
         }
@@ -280,6 +285,7 @@ impl SignalRecording {
         Ok(run)
     }
 
+    /// The recorded columns of a coordinate: its position, and its derivatives if the source allows them.
     fn recorded_coordinate(
         &self,
         name: &str,
@@ -299,7 +305,7 @@ impl SignalRecording {
         })
     }
 
-    /// Time must increase; uneven steps and gaps are worth a note.
+    /// Fails unless time increases; uneven steps and gaps are reported.
     fn check_time(
         &self,
         time: &[f64],
@@ -313,6 +319,7 @@ impl SignalRecording {
                 here: time[i + 1],
             }));
         }
+        // Statistics of the steps decide between even, jittering and missing samples.
         let steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
         if steps.is_empty() {
             return Ok(());
@@ -323,19 +330,22 @@ impl SignalRecording {
         if even::is_even(time) {
             return Ok(());
         }
-        // Where times only jitter, short steps are many and as many as long ones, and none is longer than the shortest lets expect.
+        // With jitter there are as many short steps as long ones, and no step is longer than the shortest one
+        // suggests.
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
-        let short = many(&|step| step < 0.5 * median);
-        let jitters = 2 * short > many(&|step| step > MISSING_SAMPLE_STEP * median)
-            && JITTERS * short > steps.len();
+        let short = many(&|step| step < SHORT_STEP * median);
+        let jitters = JITTER_LONG_STEPS_PER_SHORT * short
+            > many(&|step| step > MISSING_SAMPLE_STEP * median)
+            && JITTER_ONE_IN * short > steps.len();
         let longer = if jitters {
-            (1.05 * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
+            (JITTER_STEP_MARGIN * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
         } else {
             MISSING_SAMPLE_STEP * median
         };
         let gaps = many(&|step| step > longer);
-        let how = "Where anything is filtered, positions are put on even times by the spline through them at their true \
-                   times, and states are read off at these again.";
+        let how = "Before anything is filtered, positions are interpolated to even times by a spline, and states are \
+                   interpolated back to the recorded times.";
+        // The number of missing samples follows from the length of each gap.
         notes.push(if gaps > 0 {
             let lost = steps.iter().filter(|step| **step > longer);
             let lost = lost.map(|step| (step / median).round() - 1.0);
@@ -358,6 +368,7 @@ impl SignalRecording {
         Ok(())
     }
 
+    /// Drops the samples with transients at both ends; fails when no sample would remain.
     fn trim_transients(&self, run: &mut PreparedRun) -> Result<(), RecordingError> {
         let (start, end) = run.prepared.trimmed;
         let have = run.time.len();
@@ -367,7 +378,7 @@ impl SignalRecording {
                 have,
                 need: start.saturating_add(end).saturating_add(1),
                 purpose: if run.prepared.trim_asked_for {
-                    message!("dropping as many at both ends as {} asks for", trim)
+                    message!("dropping as many at both ends as {} requests", trim)
                 } else {
                     "dropping the filter's transients at both ends".into()
                 },
@@ -376,6 +387,7 @@ impl SignalRecording {
         if start + end == 0 {
             return Ok(());
         }
+        // All columns of the run lose the same samples.
         let cut = |column: &mut Vec<f64>| {
             column.truncate(have - end);
             column.drain(..start);
@@ -401,7 +413,7 @@ impl SignalRecording {
             "The first {start} and the last {end} of {have} samples of {} are dropped ({}).",
             self.file(),
             if run.prepared.trim_asked_for {
-                message!("as asked for by {}", trim)
+                message!("as requested by {}", trim)
             } else {
                 "transients of the filter".into()
             }
@@ -416,7 +428,7 @@ impl PreparedRun {
         self.time.len()
     }
 
-    /// The measured forces, `force[drive][sample]`; fails when the file lacks any of them.
+    /// The measured forces, `force[drive][sample]`. Fails when the file lacks any of them.
     pub fn measured_forces(&self) -> Result<&[Vec<f64>], RecordingError> {
         self.force.as_deref().ok_or_else(|| RecordingError {
             file: self.file.clone(),
@@ -426,13 +438,13 @@ impl PreparedRun {
         })
     }
 
-    /// Whether the force of a drive was measured in a sample, so that it counts.
+    /// Whether the force of a drive was measured in a sample. If not, it does not count.
     pub fn is_force_measured(&self, drive: usize, sample: usize) -> bool {
         self.left_out.get(drive).is_none_or(|out| !out[sample])
     }
 
-    /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, as the rows of
-    /// the regression are; fails when the file lacks any of them.
+    /// The measured forces interleaved per sample, `[sample * n_drives + drive]`, in the order of the rows of the
+    /// regression. Fails when the file lacks any of them.
     pub fn measured_interleaved(&self) -> Result<Vec<f64>, RecordingError> {
         let force = self.measured_forces()?;
         Ok((0..self.samples())
@@ -441,7 +453,7 @@ impl PreparedRun {
     }
 }
 
-/// All names that a model has for columns.
+/// All names that the model has for columns: time, coordinates with derivatives, drives with variances.
 fn expected_column_names(coordinates: &[String], drives: &[String]) -> Vec<String> {
     let mut names = vec!["t".to_owned()];
     for name in coordinates {

@@ -1,29 +1,38 @@
-//! From what a file holds of a coordinate to its position, rate and acceleration, by one of the ways of smoothing.
+//! From the recorded columns of a coordinate to its position, rate and acceleration, with one of the smoothing
+//! filters.
 
 use crate::motion::cutoff::DifferentiatedSignal;
 use crate::motion::derivatives::{SmoothedCoordinate, filter_and_differentiate};
 use crate::motion::even::{CubicSpline, SampleSpacing, even_times, sample_spacing, spread_times};
+use crate::motion::thresholds::SERIES_SAMPLES_PER_COLUMN;
 use crate::motion::{local_polynomials, series};
 use crate::words::{count_of, seven_digits};
 
-/// What the file holds of a coordinate.
+/// The recorded columns of a coordinate.
 pub(crate) struct RecordedCoordinate<'a> {
+    /// Name of the coordinate.
     pub(crate) name: String,
+    /// Positions, rad or m.
     pub(crate) q: &'a [f64],
+    /// Rates, rad/s or m/s, if they are recorded and used.
     pub(crate) qd: Option<&'a [f64]>,
+    /// Accelerations, rad/s^2 or m/s^2, if they are recorded and used.
     pub(crate) qdd: Option<&'a [f64]>,
 }
 
 impl RecordedCoordinate<'_> {
+    /// Whether both derivatives are recorded, so that nothing must be prepared.
     pub(crate) fn is_complete(&self) -> bool {
         self.qd.is_some() && self.qdd.is_some()
     }
 
+    /// Positions, rates and accelerations as recorded; `None` if any is missing.
     pub(crate) fn recorded_states(&self) -> Option<[Vec<f64>; 3]> {
         Some([self.q.to_vec(), self.qd?.to_vec(), self.qdd?.to_vec()])
     }
 
-    /// What is differentiated where something is missing: the rates if they are recorded, else the positions.
+    /// The signal that is differentiated if something is missing: the rates if they are recorded, otherwise the
+    /// positions.
     pub(crate) fn signal_to_differentiate(&self) -> DifferentiatedSignal<'_> {
         match self.qd {
             Some(values) => DifferentiatedSignal {
@@ -37,9 +46,11 @@ impl RecordedCoordinate<'_> {
         }
     }
 
-    /// What is missing is derived from the nearest that is there; positions and rates pass the same filter then, so that all
-    /// states are those of one motion. A recorded acceleration is kept.
-    /// `None` if there are too few samples.
+    /// Prepares missing derivatives from the highest one that is recorded. Positions and rates then pass the same
+    /// filter, so that all states belong to one motion. A recorded acceleration is kept. `None` if there are
+    /// too few samples.
+    ///
+    /// Fails when the filter does not fit the sampling rate.
     pub(crate) fn prepare(
         &self,
         time: &[f64],
@@ -49,7 +60,7 @@ impl RecordedCoordinate<'_> {
         if let Some(complete) = self.recorded_states() {
             return Ok(Some(complete));
         }
-        // What stands still has no rate; filters would leave rounding, whose sign is friction.
+        // A constant coordinate has rates of zero. Filters would leave rounding errors, whose sign would be friction.
         if is_constant(self.q) && self.qd.is_none_or(is_constant) {
             let zero = vec![0.0; time.len()];
             let recorded =
@@ -60,6 +71,7 @@ impl RecordedCoordinate<'_> {
                 recorded(self.qdd),
             ]));
         }
+        // The selected filter on one column.
         let smooth = |values: &[f64]| match way {
             SmoothingFilter::Butterworth { order } => {
                 smooth_at_true_times(time, values, cutoff, order).map(Some)
@@ -71,6 +83,7 @@ impl RecordedCoordinate<'_> {
                 Ok(series::project_on_series(time, values, period, harmonics))
             }
         };
+        // Recorded rates are smoothed, too, and give the accelerations.
         if let Some(qd) = self.qd {
             let (Some(q), Some(rate)) = (smooth(self.q)?, smooth(qd)?) else {
                 return Ok(None);
@@ -82,8 +95,8 @@ impl RecordedCoordinate<'_> {
     }
 }
 
-/// [`filter_and_differentiate`] of samples at any times: what is uneven is put on even times first, by the spline through
-/// the samples, and what comes out is read off at the true times again.
+/// [`filter_and_differentiate`] for samples at any times. Uneven samples are interpolated to even times by a spline,
+/// and the results are interpolated back to the recorded times.
 fn smooth_at_true_times(
     time: &[f64],
     values: &[f64],
@@ -92,6 +105,7 @@ fn smooth_at_true_times(
 ) -> Result<SmoothedCoordinate, crate::FilterError> {
     match sample_spacing(time) {
         SampleSpacing::Even => return filter_and_differentiate(time, values, cutoff, order),
+        // Rounded times are replaced by the even ones that they were rounded from.
         SampleSpacing::Rounded => {
             return filter_and_differentiate(&even_times(time), values, cutoff, order);
         }
@@ -108,20 +122,24 @@ fn smooth_at_true_times(
     })
 }
 
-/// Whether all values are the same.
+/// Whether all values are equal.
 fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|v| v.total_cmp(&values[0]).is_eq())
 }
 
-/// How positions are smoothed, with all that was left open settled.
+/// A smoothing filter with all of its numbers.
 #[derive(Clone, Copy)]
 pub(crate) enum SmoothingFilter {
+    /// Butterworth's low-pass of this order, zero phase.
     Butterworth { order: usize },
+    /// Local polynomials over `2 half_width + 1` samples.
     Polynomials { half_width: usize },
+    /// A Fourier series with this period, s, and number of harmonics.
     Series { period: f64, harmonics: usize },
 }
 
 impl SmoothingFilter {
+    /// Description for notes; `is_chosen` states whether the cut-off was chosen from the signal.
     pub(crate) fn describe(self, cutoff: f64, is_chosen: bool) -> String {
         let chosen = if is_chosen {
             " (chosen from the signal)"
@@ -133,7 +151,7 @@ impl SmoothingFilter {
                 "Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences"
             ),
             Self::Polynomials { half_width } => format!(
-                "polynomials of degree {} over {} samples each (Savitzky-Golay), which suits a cut-off of \
+                "polynomials of degree {} over {} samples each (Savitzky-Golay), which corresponds to a cut-off of \
                  {cutoff:.4} Hz{chosen}",
                 local_polynomials::DEGREE,
                 2 * half_width + 1
@@ -146,12 +164,12 @@ impl SmoothingFilter {
         }
     }
 
-    /// Samples that it needs.
+    /// Least number of samples for the filter.
     pub(crate) fn min_samples(self) -> usize {
         match self {
             Self::Butterworth { order } => 3 * (order + 1) + 1,
             Self::Polynomials { half_width } => 2 * half_width + 1,
-            Self::Series { harmonics, .. } => 2 * (2 * harmonics + 1),
+            Self::Series { harmonics, .. } => SERIES_SAMPLES_PER_COLUMN * (2 * harmonics + 1),
         }
     }
 }

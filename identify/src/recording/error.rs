@@ -1,4 +1,6 @@
-//! What can be wrong with a recording, each with the place, what was expected and what to do.
+//! Faults of a recording, each with its place, what was expected, and what to do.
+//!
+//! A fault is a value; its message has typed remedies, which each front end spells in its own words.
 
 use std::fmt;
 
@@ -9,42 +11,42 @@ use crate::recording::read::sample_place_word;
 use crate::signal::FilterError;
 use crate::words::{backquoted_list, count_of};
 
-/// A fault of a recording. Its `Display` names the file, the line and the column where they are
-/// known, and ends with what to do.
+/// A fault of a recording. Its `Display` names the file, the line and the column if they are known, and ends with
+/// advice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingError {
-    /// The file as the user named it, or a word for a stream.
+    /// The file as the user named it, or a name for a stream.
     pub file: String,
     /// What is wrong.
     pub fault: RecordingFault,
 }
 
-/// The kinds of faults of a recording. Lines count from 1 with the header.
+/// The kinds of faults of a recording. Lines count from 1, including the header.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum RecordingFault {
     /// The file cannot be opened or read.
     Unreadable {
-        /// The operating system's words.
+        /// The message of the operating system.
         reason: String,
     },
     /// The file has no bytes, or only white space.
     Empty,
     /// A header, but no sample.
     NoSamples,
-    /// The file is not CSV text: another known format or other bytes.
+    /// The file is not CSV text, but another format or other bytes.
     NotCsv {
-        /// What it looks like.
+        /// The format that the bytes look like.
         looks_like: &'static str,
     },
-    /// The file is of a format that is read, but not in this form.
+    /// The format of the file is supported, but not this form of it.
     Format {
-        /// What it is.
+        /// The format, with its article.
         format: &'static str,
         /// What is wrong, and what to do.
         message: String,
     },
-    /// The recording holds more numbers than may be kept in memory.
+    /// The recording has more numbers than may be kept in memory.
     TooLarge {
         /// The line at which reading ended.
         line: u64,
@@ -52,55 +54,55 @@ pub enum RecordingFault {
         samples: usize,
         /// Columns that are needed.
         columns: usize,
-        /// First and last time of those samples, s, where they are known.
+        /// First and last time of those samples, s, if they are known.
         until: Option<(f64, f64)>,
     },
-    /// No sample lies in the time that was asked for.
+    /// No sample lies in the requested time interval.
     NoSamplesInInterval {
-        /// From, s.
+        /// Start of the interval, s.
         from: f64,
-        /// To, s.
+        /// End of the interval, s.
         to: f64,
     },
     /// Topics or files that are needed together were not recorded at the same time.
     NoCommonTime {
-        /// What messages call them.
+        /// Their names in messages.
         parts: Vec<String>,
     },
-    /// Two files of one run have a column that is needed.
+    /// A needed column is in two files of one run.
     ColumnInTwoFiles {
         /// Its name.
         name: String,
         /// The other file.
         other: String,
     },
-    /// A sum of columns takes them from several files.
+    /// A computed column has terms in several files.
     SumAcrossFiles {
-        /// The column that it makes.
+        /// The name of the computed column.
         name: String,
     },
-    /// The first line holds numbers where column names are expected.
+    /// The first line contains numbers where column names are expected.
     NoHeader,
-    /// The separator cannot be told from the first line.
+    /// The separator cannot be determined from the first line.
     UnclearSeparator {
         /// The first line, shortened.
         header: String,
     },
     /// A column has no name.
     UnnamedColumn {
-        /// Its place, from 1.
+        /// Its position, from 1.
         place: usize,
     },
     /// Two columns have the same name.
     DuplicateColumn {
         /// The name.
         name: String,
-        /// Places of the first two that have it, from 1.
+        /// Positions of the first two that have it, from 1.
         places: [usize; 2],
-        /// Whether a renaming brought this about.
+        /// Whether a renaming caused this.
         by_renaming: bool,
     },
-    /// A renaming is given twice for the same name.
+    /// Two renamings have the same name.
     DuplicateRenaming {
         /// The name in question.
         name: String,
@@ -114,25 +116,25 @@ pub enum RecordingFault {
         /// Fields of the header.
         expected: usize,
     },
-    /// A column that is needed is not there.
+    /// A needed column does not exist.
     MissingColumn {
-        /// The name that was looked for.
+        /// The name that was requested.
         name: String,
-        /// The closest name that is there.
+        /// The nearest name that exists.
         nearest: Option<String>,
-        /// All names that are there.
+        /// All names that exist.
         present: Vec<String>,
-        /// Whether the name comes from a renaming (`theirs`).
+        /// Whether the name comes from a renaming of the user.
         by_renaming: bool,
     },
-    /// Several columns that are needed are not there.
+    /// Several needed columns do not exist.
     MissingColumns {
-        /// The names that were looked for, each with the closest name that is there.
+        /// The names that were requested, each with the nearest name that exists.
         missing: Vec<(String, Option<String>)>,
-        /// All names that are there.
+        /// All names that exist.
         present: Vec<String>,
     },
-    /// A needed column holds text that is no number.
+    /// A needed column contains text that is not a number.
     NotANumber {
         /// The column.
         column: String,
@@ -140,10 +142,10 @@ pub enum RecordingFault {
         line: u64,
         /// The text there.
         text: String,
-        /// How many fields of the column are concerned.
+        /// How many fields of the column are affected.
         count: usize,
     },
-    /// A needed column holds NaN, infinite or empty fields.
+    /// A needed column contains NaN, infinite or empty fields.
     NotFinite {
         /// The column.
         column: String,
@@ -151,10 +153,10 @@ pub enum RecordingFault {
         line: u64,
         /// The text there.
         text: String,
-        /// How many fields of the column are concerned.
+        /// How many fields of the column are affected.
         count: usize,
     },
-    /// The measured force of a drive is needed and not there.
+    /// The measured force of a drive is needed, but has no column.
     MissingForce {
         /// The drives without a column.
         drives: Vec<String>,
@@ -168,51 +170,51 @@ pub enum RecordingFault {
         /// Time there, s.
         here: f64,
     },
-    /// A quote opens a field that does not end in its line.
+    /// A quoted field does not end in its line.
     OpenQuote {
         /// The line in which it opens.
         line: u64,
     },
-    /// Too few samples for what is asked.
+    /// There are too few samples for an operation.
     TooFewSamples {
-        /// Samples there are.
+        /// Number of samples.
         have: usize,
-        /// Samples there must be.
+        /// Least number of samples.
         need: usize,
-        /// What they are needed for.
+        /// The operation.
         purpose: Message,
     },
-    /// A Fourier series was asked for, but the motion has no period that could be found.
+    /// A Fourier series was requested, but no period of the motion was found.
     NoPeriod,
-    /// The period asked for is too short for the samples, or too long for the recording.
+    /// The requested period is too short for the sampling, or too long for the recording.
     Period {
         /// The period, s.
         period: f64,
-        /// The shortest that samples can show, s.
+        /// The shortest period that the samples can resolve, s.
         shortest: f64,
-        /// The longest that the recording can show, s.
+        /// The longest period that the recording can resolve, s.
         longest: f64,
     },
     /// The cut-off's period is longer than the recording.
     CutoffTooLow {
         /// The cut-off, Hz.
         cutoff_hz: f64,
-        /// The lowest that leaves something, Hz.
+        /// The lowest cut-off that keeps some motion, Hz.
         lowest_hz: f64,
         /// Length of the recording, s.
         duration: f64,
     },
-    /// The filter that was asked for does not suit the recording.
+    /// The requested filter does not fit the recording.
     Filter {
-        /// The coordinate that was being prepared.
+        /// The coordinate that was being filtered.
         column: String,
-        /// The filter's complaint.
+        /// The fault of the filter.
         error: FilterError,
     },
 }
 
 impl RecordingError {
-    /// Where and what is wrong, and what to do.
+    /// The message: place, fault and advice.
     pub fn message(&self) -> Message {
         let file = &self.file;
         let says = self.fault.message();
@@ -232,7 +234,7 @@ impl fmt::Display for RecordingError {
 impl std::error::Error for RecordingError {}
 
 impl RecordingFault {
-    /// The line concerned, where there is one.
+    /// The line of the fault, if it has one.
     pub fn line(&self) -> Option<u64> {
         match self {
             Self::RaggedLine { line, .. }
@@ -240,6 +242,7 @@ impl RecordingFault {
             | Self::NotFinite { line, .. }
             | Self::OpenQuote { line }
             | Self::TimeNotIncreasing { line, .. }
+            // The header is always the first line.
             | Self::TooLarge { line, .. } => Some(*line),
             Self::NoHeader | Self::UnclearSeparator { .. } => Some(1),
             _ => None,
@@ -248,9 +251,10 @@ impl RecordingFault {
 }
 
 impl RecordingFault {
-    /// What is wrong, and what to do.
+    /// What is wrong, and what to do, without the place.
     #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
     pub fn message(&self) -> Message {
+        // The option that maps a name of the model to a column of the file.
         let map = |ours: &str, theirs: &str| {
             OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"))
         };
@@ -274,6 +278,7 @@ impl RecordingFault {
                 until,
                 ..
             } => {
+                // The advice is a concrete part of the recording, if its times are known.
                 let part = Remedy::option(OptionName::Between);
                 let part = match until {
                     Some((from, to)) => message!(
@@ -285,13 +290,14 @@ impl RecordingFault {
                 let comma = if until.is_some() { "," } else { "" };
                 message!(
                     "the recording is too large to be kept in memory: up to here {samples} samples of {columns} columns are \
-                     {:.1} GB; take a part of it{comma} {}",
+                     {:.1} GB; read a part of it{comma} {}",
+                    // The size is 8 bytes per number; the line of each sample counts as one number.
                     8e-9 * (*samples as f64) * (*columns as f64 + 1.0),
                     part
                 )
             }
             Self::NoSamplesInInterval { from, to } => message!(
-                "no sample lies between t = {from} s and {to} s, as {} asks; give times that the recording has",
+                "no sample lies between t = {from} s and {to} s, as {} requests; give times within the recording",
                 Remedy::option(OptionName::Between)
             ),
             Self::NoCommonTime { parts } => message!(
@@ -302,16 +308,16 @@ impl RecordingFault {
                 "the column `{name}` is in {other} too; rename it in one of the two files, or leave one of them out"
             ),
             Self::SumAcrossFiles { name } => message!(
-                "`{name}` is a sum of columns of several files, which is read from one file only; add them up in a file before"
+                "`{name}` is a sum of columns of several files, but a sum is read from one file only; compute it in one file first"
             ),
-            Self::NoHeader => "the first line holds numbers, but column names are expected there; \
+            Self::NoHeader => "the first line contains numbers, but column names are expected there; \
                  put a line such as `t,theta1,spindle_left` on top"
                 .into(),
             Self::UnclearSeparator { header } if header.starts_with('#') => message!(
                 "the first line must name the columns, but it is `{header}`; comment lines are not read, delete them"
             ),
             Self::UnclearSeparator { header } => message!(
-                "it cannot be told what separates the columns of `{header}`; \
+                "the separator of the columns is not clear in `{header}`; \
                  use a comma (or `;` or a tab) throughout and a point for decimals"
             ),
             Self::UnnamedColumn { place } => message!(
@@ -322,8 +328,9 @@ impl RecordingFault {
                 places: [a, b],
                 by_renaming,
             } => {
+                // The advice depends on whether the file or a renaming has the duplicate.
                 let what = if *by_renaming {
-                    "a renaming brings this about: leave it out, or rename the other column too"
+                    "a renaming causes this: remove it, or rename the other column too"
                 } else {
                     "give every column a name of its own"
                 };
@@ -343,13 +350,14 @@ impl RecordingFault {
                 present,
                 by_renaming,
             } => {
+                // First what is missing, then the nearest name, all names, and how to map one.
                 let missing = if *by_renaming {
-                    format!("a renaming asks for the column `{name}`, which is not there")
+                    format!("a renaming refers to the column `{name}`, which is not there")
                 } else {
                     format!("there is no column `{name}`")
                 };
                 let meant = match nearest {
-                    Some(nearest) => format!("; is `{nearest}` meant?"),
+                    Some(nearest) => format!("; did you mean `{nearest}`?"),
                     None => ".".to_owned(),
                 };
                 let how = if *by_renaming {
@@ -370,7 +378,7 @@ impl RecordingFault {
                 let all: Vec<String> = missing
                     .iter()
                     .map(|(name, nearest)| match nearest {
-                        Some(nearest) => format!("`{name}` (is `{nearest}` meant?)"),
+                        Some(nearest) => format!("`{name}` (did you mean `{nearest}`?)"),
                         None => format!("`{name}`"),
                     })
                     .collect();
@@ -390,14 +398,15 @@ impl RecordingFault {
                 count,
                 ..
             } => {
-                let write_other_count = write_other_count(*count, "fields of the column are no numbers");
+                let write_other_count = write_other_count(*count, "fields of the column are not numbers");
+                // A comma between two integers is most likely a decimal comma.
                 let what = if looks_like_decimal_comma(text) {
                     "write decimals with a point"
                 } else {
                     "correct or remove it"
                 };
                 message!(
-                    "column `{column}` holds `{text}` where a number is expected{write_other_count}; {what}"
+                    "column `{column}` contains `{text}` where a number is expected{write_other_count}; {what}"
                 )
             }
             Self::NotFinite {
@@ -406,6 +415,7 @@ impl RecordingFault {
                 count,
                 ..
             } => {
+                // Finite numbers get here only if they are too large to be measurements.
                 let holds = if text.is_empty() {
                     format!("column `{column}` is empty where a number is expected")
                 } else {
@@ -413,7 +423,7 @@ impl RecordingFault {
                         Ok(value) if value.is_finite() => "a number that was measured",
                         _ => "a finite number",
                     };
-                    format!("column `{column}` holds `{text}` where {expected} is expected")
+                    format!("column `{column}` contains `{text}` where {expected} is expected")
                 };
                 message!(
                     "{holds}{}; repair the recording, or leave such samples out with {} (they are counted)",
@@ -461,7 +471,7 @@ impl RecordingFault {
                 shortest,
                 longest,
             } => message!(
-                "a period of {period} s was asked for, but this recording can show periods from {shortest:.6} s to \
+                "a period of {period} s was requested, but this recording can show periods from {shortest:.6} s to \
                  {longest:.6} s only; choose one of them, or another smoothing"
             ),
             Self::CutoffTooLow {
@@ -469,8 +479,8 @@ impl RecordingFault {
                 lowest_hz,
                 duration,
             } => message!(
-                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, of which no motion would be \
-                 left; choose one above {lowest_hz:.4} Hz, or leave {} away and have it chosen from the signal",
+                "a cut-off of {cutoff_hz} Hz is too low for a recording of {duration:.4} s, because it would remove all \
+                 motion; choose one above {lowest_hz:.4} Hz, or omit {} so that it is chosen from the signal",
                 Remedy::option(OptionName::CutoffHz)
             ),
             Self::Filter { column, error } => {
@@ -486,7 +496,7 @@ impl fmt::Display for RecordingFault {
     }
 }
 
-/// Names the columns that are there.
+/// A sentence that lists the existing columns, with a hint if the header looks like a comment.
 fn columns_there(present: &[String]) -> String {
     let mut says = format!(" The columns are: {}.", backquoted_list(present));
     if present.first().is_some_and(|first| first.starts_with('#')) {
@@ -497,7 +507,7 @@ fn columns_there(present: &[String]) -> String {
     says
 }
 
-/// Says how many other fields share the fault.
+/// The number of affected fields in parentheses; empty if there is only one.
 fn write_other_count(count: usize, what: &str) -> String {
     if count > 1 {
         format!(" ({count} {what})")
@@ -506,6 +516,7 @@ fn write_other_count(count: usize, what: &str) -> String {
     }
 }
 
+/// Whether a text becomes a number if its only comma is replaced by a point.
 fn looks_like_decimal_comma(text: &str) -> bool {
     text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
 }

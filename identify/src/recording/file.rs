@@ -1,5 +1,5 @@
-//! The file of a recording, opened once: an ordinary file is read from its place, so that it may be longer than memory;
-//! what came through a pipe, files that are in memory anyway, and tables are read from there.
+//! A recording that is opened once and read as often as needed. An ordinary file is read from disk each time, so that
+//! it may be larger than memory. The contents of pipes, files in memory and tables are kept in memory.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -15,20 +15,26 @@ use crate::recording::formats::{
 use crate::recording::table::{self, MemoryTable};
 use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
 
-/// A recording that is open, to be read as often as needed.
+/// An open recording.
 pub struct RecordingFile {
+    /// Its name in messages.
     name: String,
+    /// Where its bytes are.
     source: RecordingSource,
 }
 
+/// Where the samples come from.
 enum RecordingSource {
+    /// A file on disk with its format.
     File(&'static dyn RecordingFormat, File),
+    /// A complete file in memory with its format.
     Memory(&'static dyn RecordingFormat, Arc<Vec<u8>>),
+    /// Columns in memory.
     Table(MemoryTable),
 }
 
 impl RecordingFile {
-    /// Opens a recording; fails when it cannot be read, or is a pipe that does not end.
+    /// Opens a recording. Fails when it cannot be read, or when a pipe has more bytes than `LONGEST_STREAM`.
     pub fn open(files: &dyn FileSource, path: &Path) -> Result<Self, RecordingError> {
         let name = path.display().to_string();
         let fail = |reason: String| RecordingError {
@@ -38,6 +44,7 @@ impl RecordingFile {
         let opened = files.open(path, LONGEST_STREAM);
         match opened.map_err(|error| fail(error.fault.to_string()))? {
             OpenFile::File(mut file) => {
+                // The first bytes decide the format.
                 let mut first = Vec::new();
                 (&mut file)
                     .take(SIGNATURE_BYTES as u64)
@@ -55,7 +62,7 @@ impl RecordingFile {
         }
     }
 
-    /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
+    /// Makes a recording of columns in memory; `name` is its name in messages. Fails when columns differ in length.
     pub fn from_table(
         name: &str,
         columns: Vec<(String, Vec<f64>)>,
@@ -70,12 +77,12 @@ impl RecordingFile {
         }
     }
 
-    /// What messages call it.
+    /// Its name in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The names of its columns as the file has them; fails when it cannot be read.
+    /// The names of its columns as in the file. Fails when the file cannot be read.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
         self.dispatch_to_source(
             |format, input| format.names(input),
@@ -83,7 +90,7 @@ impl RecordingFile {
         )
     }
 
-    /// What it holds, table by table or topic by topic; fails when it cannot be read.
+    /// Its tables or topics with their columns. Fails when the file cannot be read.
     pub fn tables(&self) -> Result<Vec<TableInfo>, RecordingError> {
         self.dispatch_to_source(
             |format, input| format.tables(input),
@@ -91,7 +98,7 @@ impl RecordingFile {
         )
     }
 
-    /// Reads it; fails as [`Recording::read`] does.
+    /// Reads it with the given options. Fails as [`SignalRecording::read`] does.
     pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
         self.dispatch_to_source(
             |format, input| format.read(input, &self.name, options),
@@ -99,7 +106,7 @@ impl RecordingFile {
         )
     }
 
-    /// What its format says of all of it, from its beginning.
+    /// Calls the function for its kind of source, with input that starts at the first byte; adds the name to faults.
     fn dispatch_to_source<T>(
         &self,
         of_format: impl FnOnce(&dyn RecordingFormat, RecordingInput<'_>) -> Result<T, RecordingFault>,
@@ -110,6 +117,7 @@ impl RecordingFile {
             RecordingSource::Memory(format, bytes) => {
                 of_format(*format, RecordingInput::Bytes(bytes))
             }
+            // The handle is shared, so the position must be reset before each read.
             RecordingSource::File(format, file) => {
                 let rewound = file.try_clone().and_then(|mut file| {
                     file.rewind()?;
@@ -125,6 +133,7 @@ impl RecordingFile {
         answer.map_err(|fault| self.fault(fault))
     }
 
+    /// A fault of this recording.
     pub(crate) fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.name.clone(),

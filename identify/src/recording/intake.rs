@@ -1,5 +1,7 @@
-//! Samples of a recording on their way into memory, whatever the format of the file: names are checked and
-//! changed, columns that nobody needs are passed over, and fields that are no numbers are noted with their place.
+//! Takes the samples of a recording into memory, whatever the format of the file. Names are checked and renamed,
+//! columns that are not needed are skipped, and fields that are not numbers are recorded with their place.
+//!
+//! A reader creates a [`SampleIntake`], passes each sample to it, and gets the recording from `finish`.
 
 use indexmap::IndexMap;
 
@@ -10,37 +12,46 @@ use crate::recording::notes::RecordingNote;
 use crate::recording::options::{ComputedColumn, NonFinitePolicy, ReadOptions};
 use crate::words::count_of;
 
-/// Whether more samples are wanted.
+/// Whether the reader should continue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum IntakeFlow {
+    /// Continue with the next sample.
     Go,
+    /// No later sample is needed.
     Stop,
 }
 
-/// Takes samples one by one.
+/// Takes samples one by one and collects the columns that are needed.
 pub(crate) struct SampleIntake<'a> {
+    /// What the caller wants to read.
     options: &'a ReadOptions,
+    /// Names of the columns in the file.
     theirs: Vec<String>,
+    /// Names after renaming, in the order of the file.
     names: Vec<String>,
-    /// Places of the columns that are kept.
+    /// Whether each column is kept.
     kept: Vec<bool>,
-    /// Places of columns that only those need of which single values may be missing.
+    /// Whether single values of each column may be missing.
     may_lack: Vec<bool>,
+    /// The columns by their position in the file; empty if they are not kept.
     columns: Vec<SignalColumn>,
+    /// Line or row of each sample that was taken.
     lines: Vec<u64>,
-    /// The first sample that was left out, and how many were.
+    /// Line of the first sample that was left out for a bad field, and the number of such samples.
     left_out: Option<(u64, usize)>,
-    /// How the time of a sample follows from its fields, where samples are chosen by it.
+    /// The time as a sum of fields, by position and factor, and a constant; only if samples are selected by time.
     time: Option<(Vec<(usize, f64)>, f64)>,
+    /// Number of samples before the time interval.
     before: usize,
-    /// The line from which on nothing was read.
+    /// The line at which reading stopped, because the time interval had ended.
     stopped: Option<u64>,
+    /// Notes for the user.
     notes: Vec<RecordingNote>,
 }
 
 impl<'a> SampleIntake<'a> {
-    /// Ready for samples of columns that the file calls `theirs`.
-    /// Fails when names are missing or double, or a renaming or computed column asks for one that is not there.
+    /// Prepares for samples of columns that the file calls `theirs`. Fails when names are missing or duplicate, or
+    /// when a renaming or computed column refers to a column that does not exist.
     pub(crate) fn new(
         theirs: Vec<String>,
         options: &'a ReadOptions,
@@ -50,6 +61,7 @@ impl<'a> SampleIntake<'a> {
             let place = theirs.iter().position(|other| other == name);
             place.ok_or_else(|| missing_column_fault(name, theirs.iter().map(String::as_str), true))
         };
+        // Columns that computed ones are made of are read even if they are not wanted.
         let mut sources = Vec::new();
         for computed in &options.computed {
             for (name, _) in &computed.terms {
@@ -57,7 +69,7 @@ impl<'a> SampleIntake<'a> {
             }
         }
         let mut names = rename(&theirs, &options.renames)?;
-        // A computed column takes the place of one that the file calls so.
+        // A computed column replaces a column of the same name in the file, which gets another name.
         for computed in &options.computed {
             for (name, of_theirs) in names.iter_mut().zip(&theirs) {
                 if *name == computed.name {
@@ -66,17 +78,20 @@ impl<'a> SampleIntake<'a> {
             }
         }
         find_duplicate(&names, true)?;
+        // Without a list of wanted columns all of them are wanted.
         let is_wanted = |name: &String| {
             let wanted = options.wanted.as_ref();
             wanted.is_none_or(|wanted| wanted.contains(name))
         };
+        // Wanted columns are kept; columns that may lack values do not cause a sample to be left out.
         let mut kept: Vec<bool> = names.iter().map(is_wanted).collect();
         let is_optional = |name: &String| options.may_be_missing.contains(name);
         let mut may_lack: Vec<bool> = names.iter().map(is_optional).collect();
         for (name, may_lack) in names.iter().zip(&mut may_lack) {
-            // A column that nobody wants by itself is a source of computed ones.
+            // An unwanted column is only a source of computed ones, which decide below whether it may lack values.
             *may_lack |= !is_wanted(name);
         }
+        // A source must be complete if any computed column that needs it must be.
         for computed in &options.computed {
             for (name, _) in &computed.terms {
                 may_lack[place(name)?] &= is_optional(&computed.name);
@@ -85,6 +100,7 @@ impl<'a> SampleIntake<'a> {
         for place in sources {
             kept[place] = true;
         }
+        // The time is needed to select samples; it may be computed itself.
         let time = match options.time_interval {
             None => None,
             Some(_) => match options.computed.iter().find(|one| one.name == "t") {
@@ -122,29 +138,30 @@ impl<'a> SampleIntake<'a> {
         })
     }
 
-    /// Fields of a sample.
+    /// Number of fields of a sample.
     pub(crate) fn width(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether the fields at this place are looked at.
+    /// Whether the field at this position is used; readers may skip all others.
     pub(crate) fn is_place_needed(&self, place: usize) -> bool {
         self.kept[place] || is_time_place(self.time.as_ref(), place)
     }
 
-    /// A remark on the file.
+    /// Adds a note about the file.
     pub(crate) fn note(&mut self, note: RecordingNote) {
         self.notes.push(note);
     }
 
-    /// Takes a sample; `text` gives a field as it stands in the file, for messages.
-    /// Fails when more numbers would be kept than allowed.
+    /// Takes a sample from a line; `text` returns a field as it stands in the file, for messages. Fails when more
+    /// numbers would be kept than allowed.
     pub(crate) fn take_sample(
         &mut self,
         line: u64,
         sample: &[SampleField],
         text: &dyn Fn(usize) -> String,
     ) -> Result<IntakeFlow, RecordingFault> {
+        // First the time interval: times increase, so the first time behind it ends the reading.
         if let (Some((from, to)), Some(time)) = (self.options.time_interval, self.time_of(sample)) {
             if time < from {
                 self.before += 1;
@@ -155,6 +172,7 @@ impl<'a> SampleIntake<'a> {
                 return Ok(IntakeFlow::Stop);
             }
         }
+        // Then bad fields: a sample is left out if a field that must be present is bad.
         let is_read = |place: usize| self.kept[place] && !self.may_lack[place];
         if self.options.not_finite == NonFinitePolicy::LeaveOut
             && (0..sample.len()).any(|i| is_read(i) && sample[i] == SampleField::NotFinite)
@@ -163,7 +181,7 @@ impl<'a> SampleIntake<'a> {
             return Ok(IntakeFlow::Go);
         }
         let n_kept = self.kept.iter().filter(|kept| **kept).count() + self.options.computed.len();
-        // The line of each sample is kept with its numbers.
+        // The line of each sample is kept with its numbers, so it counts, too.
         if (self.lines.len() + 1) * (n_kept + 1) > self.options.max_numbers {
             return Err(RecordingFault::TooLarge {
                 line,
@@ -181,28 +199,30 @@ impl<'a> SampleIntake<'a> {
         Ok(IntakeFlow::Go)
     }
 
+    /// The time of a sample; `None` if a field of it is not a number.
     fn time_of(&self, sample: &[SampleField]) -> Option<f64> {
         let (terms, offset) = self.time.as_ref()?;
         let mut time = *offset;
         for (place, factor) in terms {
             match sample[*place] {
                 SampleField::Number(value) => time += factor * value,
-                // What has no time is kept: the check of time will name it.
+                // A sample without a time is kept; the check of the time column reports it.
                 SampleField::NotFinite | SampleField::Text => return None,
             }
         }
         Some(time)
     }
 
-    /// First and last time that were taken, where they are known.
+    /// First and last time that were taken, if the file has a column `t`.
     fn last_time(&self) -> Option<(f64, f64)> {
         let place = self.names.iter().position(|name| name == "t")?;
         let column = &self.columns[place].values;
         Some((*column.first()?, *column.last()?))
     }
 
-    /// The recording; fails when there are no samples.
+    /// Completes the recording, which messages call `file`. Fails when there are no samples.
     pub(crate) fn finish(self, file: &str) -> Result<SignalRecording, RecordingFault> {
+        // An empty result has another cause if a time interval was requested.
         if self.lines.is_empty() {
             if let (Some((from, to)), true) = (
                 self.options.time_interval,
@@ -212,14 +232,15 @@ impl<'a> SampleIntake<'a> {
             }
             return Err(RecordingFault::NoSamples);
         }
+        // Notes on samples that were skipped or left out.
         let mut notes = self.notes;
         if let Some((from, to)) = self.options.time_interval {
             let rest = match self.stopped {
-                Some(line) => format!(", and nothing from line {line} on"),
+                Some(line) => format!(", and all from line {line} on"),
                 None => String::new(),
             };
             notes.push(RecordingNote::info(format!(
-                "Of {file} the {} from t = {from} s to {to} s are read; {} before{rest} {} not.",
+                "Of {file} only the {} from t = {from} s to {to} s are read; {} before{rest} {} skipped.",
                 count_of(self.lines.len(), "sample", "samples"),
                 count_of(self.before, "sample", "samples"),
                 if self.before == 1 { "is" } else { "are" },
@@ -229,10 +250,11 @@ impl<'a> SampleIntake<'a> {
             notes.push(RecordingNote::warning(format!(
                 "{n} of {} samples of {file} {} NaN, infinite or empty fields and {} left out, the first in line {first}.",
                 n + self.lines.len(),
-                if n == 1 { "holds" } else { "hold" },
+                if n == 1 { "contains" } else { "contain" },
                 if n == 1 { "is" } else { "are" },
             )));
         }
+        // Computed columns come from the kept columns, before these are sorted by whether they are wanted.
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
             computed.insert(
@@ -251,14 +273,15 @@ impl<'a> SampleIntake<'a> {
             }
         }
         columns.extend(computed);
+        // Columns with defects are reported now, and refused when they are used.
         for (name, column) in &columns {
             for (defect, what) in [
-                (&column.text, "text that is no number"),
+                (&column.text, "text that is not a number"),
                 (&column.not_finite, "NaN, infinite or empty fields"),
             ] {
                 if let Some(ColumnDefect { line, count, .. }) = defect {
                     notes.push(RecordingNote::warning(format!(
-                        "Column `{name}` of {file} holds {what} ({}, the first in line {line}) and cannot be used.",
+                        "Column `{name}` of {file} contains {what} ({}, the first in line {line}) and cannot be used.",
                         count_of(*count, "field", "fields")
                     )));
                 }
@@ -274,11 +297,12 @@ impl<'a> SampleIntake<'a> {
     }
 }
 
+/// Whether the time is computed from the field at this position.
 fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool {
     time.is_some_and(|(terms, _)| terms.iter().any(|(other, _)| *other == place))
 }
 
-/// The sum of columns; what is wrong with any of them is wrong with the sum.
+/// A computed column: `offset + sum of factor * column`. Defects of any term are defects of the sum.
 fn compute_column(
     computed: &ComputedColumn,
     theirs: &[String],
@@ -302,6 +326,7 @@ fn compute_column(
     sum
 }
 
+/// Fails when a column has no name, or two have the same.
 fn check_names(names: &[String]) -> Result<(), RecordingFault> {
     for (i, name) in names.iter().enumerate() {
         if name.is_empty() {
@@ -311,6 +336,7 @@ fn check_names(names: &[String]) -> Result<(), RecordingFault> {
     find_duplicate(names, false)
 }
 
+/// Fails when two names are equal; positions in the fault count from 1.
 fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), RecordingFault> {
     let mut seen = std::collections::BTreeMap::new();
     for (i, name) in names.iter().enumerate() {
@@ -325,9 +351,11 @@ fn find_duplicate(names: &[String], by_renaming: bool) -> Result<(), RecordingFa
     Ok(())
 }
 
+/// Applies renamings `(ours, theirs)`. Fails when a name occurs twice in them, or a column does not exist.
 fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>, RecordingFault> {
     let mut renamed = names.to_vec();
     for (i, (ours, theirs)) in renames.iter().enumerate() {
+        // Each column and each new name may occur once.
         if renames[..i].iter().any(|(o, t)| o == ours || t == theirs) {
             let twice_ours = renames[..i].iter().any(|(o, _)| o == ours);
             return Err(RecordingFault::DuplicateRenaming {

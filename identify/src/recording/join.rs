@@ -1,43 +1,46 @@
-//! Columns that were sampled at different times, such as topics of a log or files of one run: each with its times go in,
-//! rows with a value of every column come out.
+//! Joins columns that were sampled at different times, such as topics of a log or files of one run. Columns with
+//! their times go in, rows with a value of every column come out.
 //!
-//! The slowest part gives the times, so that no samples are invented; the others are interpolated linearly between the two
-//! samples around. Rows for which a part has no samples nearby are left out.
+//! The slowest part gives the sample times, so that no samples are invented. The other parts are interpolated
+//! linearly between their two neighbouring samples. Rows without neighbouring samples in some part are left out.
 //!
-//! Decision: interpolation to the fastest rate would count samples that nobody took, and standard deviations would
-//! be too small.
+//! Decision: interpolation to the fastest rate would count samples that were never measured, and standard deviations
+//! would be too small.
 
 use crate::recording::error::RecordingFault;
-use crate::recording::gaps::GAP;
 use crate::recording::notes::RecordingNote;
+use crate::recording::thresholds::{EQUALLY_SLOW_SHARE, GAP_LEAST_STEPS};
 use crate::signal::median;
 use crate::words::{backquoted_list, count_of};
 
 /// Columns with the same times.
 #[derive(Debug)]
 pub(crate) struct JoinPart {
-    /// What messages call it.
+    /// Its name in messages.
     pub(crate) name: String,
     /// Times of the samples, s.
     pub(crate) time: Vec<f64>,
-    /// Values by the place where they go.
+    /// Values, each with the position of its column in the result.
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
 
-/// Columns that have all the same times.
+/// Columns with common times.
 #[derive(Debug)]
 pub(crate) struct JoinedColumns {
+    /// Times of the rows, s.
     pub(crate) time: Vec<f64>,
+    /// Values, each with the position of its column in the result.
     pub(crate) columns: Vec<(usize, Vec<f64>)>,
 }
 
-/// Joins parts; `None` if there are none. `tell` hears what was done.
+/// Joins parts; `None` if there are none. `tell` receives notes about what was done.
 ///
 /// Fails when the times of a part do not increase, or parts have no time in common.
 pub(crate) fn join_parts(
     mut parts: Vec<JoinPart>,
     tell: &mut dyn FnMut(RecordingNote),
 ) -> Result<Option<JoinedColumns>, RecordingFault> {
+    // A single part needs no interpolation.
     if parts.len() < 2 {
         return Ok(parts.pop().map(|part| JoinedColumns {
             time: part.time,
@@ -49,9 +52,9 @@ pub(crate) fn join_parts(
     }
     let steps: Vec<f64> = parts.iter().map(usual_step).collect();
     let slowest = steps.iter().copied().fold(0.0, f64::max);
-    // Of those that are equally slow the one with the most columns, and of these the first.
+    // Among equally slow parts the one with the most columns is the base; among these the first.
     let base = (0..parts.len())
-        .filter(|i| steps[*i] >= 0.99 * slowest)
+        .filter(|i| steps[*i] >= EQUALLY_SLOW_SHARE * slowest)
         .rev()
         .max_by_key(|i| parts[*i].columns.len())
         .unwrap_or(0);
@@ -66,11 +69,13 @@ pub(crate) fn join_parts(
     let mut is_covered = vec![true; n];
     let mut others = Vec::new();
     let mut columns = base.columns;
+    // Interpolate every other part to the times of the base.
     for (part, step) in parts.into_iter().zip(others_steps) {
+        // The neighbouring samples of each row; none in a gap of this part.
         let around: Vec<Option<(usize, f64)>> = base
             .time
             .iter()
-            .map(|t| find_sample(*t, &part.time, GAP * step.max(base_step)))
+            .map(|t| find_sample(*t, &part.time, GAP_LEAST_STEPS * step.max(base_step)))
             .collect();
         for (covered, around) in is_covered.iter_mut().zip(&around) {
             *covered &= around.is_some();
@@ -79,6 +84,7 @@ pub(crate) fn join_parts(
             others.push(part.name);
         }
         for (place, values) in part.columns {
+            // The first sample of the pair, plus the share of the way to the second one.
             let value = |around: &Option<(usize, f64)>| match around {
                 Some((k, share)) if *share != 0.0 => {
                     values[*k] + share * (values[k + 1] - values[*k])
@@ -89,14 +95,14 @@ pub(crate) fn join_parts(
             columns.push((place, around.iter().map(value).collect()));
         }
     }
+    // A row is kept only if all parts have neighbouring samples.
     let covered = is_covered.iter().filter(|covered| **covered).count();
     if covered == 0 {
         return Err(RecordingFault::NoCommonTime { parts: names });
     }
     if !others.is_empty() {
         tell(RecordingNote::info(format!(
-            "Samples are those of `{}`, {base_step:.3e} s apart; {} {} taken at their times, between samples by straight \
-             lines.",
+            "The sample times are those of `{}`, {base_step:.3e} s apart; {} {} interpolated linearly to them.",
             base.name,
             backquoted_list(&others),
             if others.len() == 1 { "is" } else { "are" },
@@ -104,12 +110,13 @@ pub(crate) fn join_parts(
     }
     if covered < n {
         tell(RecordingNote::warning(format!(
-            "{} of `{}` {} not between samples of all others and left out.",
+            "{} of `{}` {} left out, because another part has no samples around that time.",
             count_of(n - covered, "sample", "samples"),
             base.name,
             if n - covered == 1 { "is" } else { "are" },
         )));
     }
+    // Remove the rows that are left out from all columns.
     let kept = |values: Vec<f64>| -> Vec<f64> {
         let pairs = values.into_iter().zip(&is_covered);
         pairs
@@ -126,8 +133,10 @@ pub(crate) fn join_parts(
     }))
 }
 
+/// Fails when the times of a part do not increase; lines count from 1 with the header.
 fn check_increasing(part: &JoinPart) -> Result<(), RecordingFault> {
     for (k, pair) in part.time.windows(2).enumerate() {
+        // A comparison with NaN fails as well.
         if pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater) {
             return Err(RecordingFault::TimeNotIncreasing {
                 line: k as u64 + 2,
@@ -139,11 +148,13 @@ fn check_increasing(part: &JoinPart) -> Result<(), RecordingFault> {
     Ok(())
 }
 
+/// Median step of time of a part, s.
 fn usual_step(part: &JoinPart) -> f64 {
     median(part.time.windows(2).map(|pair| pair[1] - pair[0]).collect())
 }
 
-/// The sample at or before `t` with the share of the way to the next one; `None` outside, and in gaps longer than `gap`.
+/// The sample at or before `t`, and the share of the way to the next one. `None` outside of the times, and in gaps
+/// longer than `gap`, s.
 fn find_sample(t: f64, times: &[f64], gap: f64) -> Option<(usize, f64)> {
     let after = times.partition_point(|other| *other <= t);
     let k = after.checked_sub(1)?;

@@ -1,8 +1,8 @@
 //! Recordings: a file of any format of the list in `formats` goes in, named columns of numbers come out.
 //!
-//! A column that holds something else than numbers harms only those who ask for it: it is named in
-//! the notes, and [`Recording::column`] refuses it with the line at fault.
-//! [`Recording::states`](crate::recording::Recording::states) makes a [`Run`](crate::Run) of it.
+//! A column with anything else than numbers is a fault only for callers that use it. The notes name it, and
+//! [`SignalRecording::column`] refuses it with the line of the first bad field. `SignalRecording::states` makes a
+//! [`PreparedRun`](crate::PreparedRun) of a recording.
 
 mod column;
 mod error;
@@ -17,6 +17,7 @@ mod read;
 mod repair;
 mod table;
 mod tables;
+mod thresholds;
 mod together;
 
 use indexmap::IndexMap;
@@ -31,21 +32,25 @@ pub use tables::{ColumnInfo, TableInfo};
 pub use together::RecordingFiles;
 
 use column::{ColumnDefect, SignalColumn, missing_column_fault};
-pub(crate) use gaps::GAP;
+pub(crate) use thresholds::GAP_LEAST_STEPS;
 
-/// A recording in memory: columns of equal length by name, in the file's order.
+/// A recording in memory: columns of equal length by name, in the order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SignalRecording {
+    /// Name of the file in messages.
     pub(crate) file: String,
+    /// Columns by their names after renaming; computed ones at the end.
     pub(crate) columns: IndexMap<String, SignalColumn>,
     /// Names of the columns of the file that were not needed.
     pub(crate) others: Vec<String>,
+    /// Line or row of each sample in the file, from 1.
     pub(crate) lines: Vec<u64>,
+    /// Notes on the file and on what was done with it.
     pub(crate) notes: Vec<RecordingNote>,
 }
 
 impl SignalRecording {
-    /// What messages call the recording.
+    /// Name of the recording in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
@@ -55,7 +60,7 @@ impl SignalRecording {
         self.lines.len()
     }
 
-    /// Names of all columns after renaming, those that were not needed at the end.
+    /// Names of all columns after renaming; those that were not needed come last.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         let others = self.others.iter().map(String::as_str);
         self.columns.keys().map(String::as_str).chain(others)
@@ -66,7 +71,8 @@ impl SignalRecording {
         self.columns.contains_key(name)
     }
 
-    /// Samples whose value of a column joins its neighbours, since none was measured or a sensor failed; `None` if there are none.
+    /// Samples of a column with interpolated values, because none was measured or a sensor failed; `None` if there
+    /// are none.
     pub(crate) fn lost_samples(&self, name: &str) -> Option<&[bool]> {
         let lost = &self.columns.get(name)?.interpolated;
         lost.contains(&true).then_some(lost.as_slice())
@@ -77,17 +83,18 @@ impl SignalRecording {
         self.lines.get(sample).copied()
     }
 
-    /// What the user should know about the file.
+    /// Notes on the file for the user.
     pub fn notes(&self) -> &[RecordingNote] {
         &self.notes
     }
 
-    /// The numbers of a column, one per sample.
-    /// Fails when it is not there or holds fields that are no finite numbers.
+    /// The numbers of a column, one per sample. Fails when the column does not exist, or has fields that are not
+    /// finite numbers.
     pub fn column(&self, name: &str) -> Result<&[f64], RecordingError> {
         let Some(column) = self.columns.get(name) else {
             return Err(self.fault(missing_column_fault(name, self.names(), false)));
         };
+        // Text is reported before missing values, because it is the more serious defect.
         if let Some(ColumnDefect { line, text, count }) = column.text.clone() {
             return Err(self.fault(RecordingFault::NotANumber {
                 column: name.to_owned(),
@@ -107,7 +114,7 @@ impl SignalRecording {
         Ok(&column.values)
     }
 
-    /// The numbers of a column, as [`Recording::column`]; columns of the names `wanted` are not proposed for it.
+    /// The numbers of a column, as [`Self::column`]. Columns named in `wanted` are not suggested for a missing one.
     pub(crate) fn column_without_suggesting(
         &self,
         name: &str,
@@ -127,8 +134,8 @@ impl SignalRecording {
         Err(self.fault(fault))
     }
 
-    /// Fails when more than one of the names `needed` is no column, and says all of them at once; columns of the names `wanted`
-    /// are not proposed, and none twice.
+    /// Fails when more than one of the columns `needed` does not exist, and reports all of them at once. Columns
+    /// named in `wanted` are not suggested, and no column is suggested twice.
     pub(crate) fn check_columns(
         &self,
         needed: &[String],
@@ -138,6 +145,7 @@ impl SignalRecording {
             .iter()
             .filter(|name| !self.has_column(name))
             .collect();
+        // A single missing column has its own fault.
         if missing.len() < 2 {
             return Ok(());
         }
@@ -156,14 +164,16 @@ impl SignalRecording {
         }))
     }
 
-    /// Puts numbers in the place of a column, or adds one; one for each sample (asserted).
+    /// Replaces the numbers of a column, or adds a column.
+    ///
+    /// Panics unless there is one number for each sample.
     pub fn set_column(&mut self, name: &str, values: Vec<f64>) {
         assert_eq!(values.len(), self.samples(), "one number for each sample");
         let column = self.columns.entry(name.to_owned()).or_default();
         column.values = values;
     }
 
-    /// The samples from `start` to before `end` as a recording of its own, without the notes.
+    /// The samples from `start` up to, but not including `end` as a recording of its own, without notes.
     pub(crate) fn extract_segment(&self, file: String, start: usize, end: usize) -> Self {
         let columns = self.columns.iter().map(|(name, column)| {
             let column = SignalColumn {
@@ -184,6 +194,7 @@ impl SignalRecording {
         }
     }
 
+    /// A fault of this recording.
     pub(crate) fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.file.clone(),

@@ -1,4 +1,4 @@
-//! Columns of numbers that are in memory, such as those of a data frame, read as a file's are.
+//! Columns of numbers in memory, such as those of a data frame, read like those of a file.
 
 use crate::recording::column::SampleField;
 use crate::recording::error::RecordingFault;
@@ -6,14 +6,14 @@ use crate::recording::intake::{IntakeFlow, SampleIntake};
 use crate::recording::tables::{ColumnInfo, TableInfo, find_time_range};
 use crate::recording::{ReadOptions, SignalRecording};
 
-/// What follows the name of a table, so that its samples are called rows.
+/// Suffix of the name of a table in messages; it also makes its samples rows.
 pub(crate) const SUFFIX: &str = " (table)";
 
-/// Columns of equal length with their names. NaN stands for what is missing.
+/// Columns of equal length with their names. NaN stands for a missing value.
 pub(crate) struct MemoryTable(Vec<(String, Vec<f64>)>);
 
 impl MemoryTable {
-    /// Fails when columns differ in length.
+    /// Makes a table. Fails when columns differ in length.
     pub(crate) fn new(columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingFault> {
         if let [(first, values), others @ ..] = columns.as_slice()
             && let Some((name, other)) = others.iter().find(|(_, v)| v.len() != values.len())
@@ -34,12 +34,13 @@ impl MemoryTable {
         self.0.iter().map(|(name, _)| name.clone()).collect()
     }
 
-    /// Reads it; fails as [`Recording::read`] does.
+    /// Reads it as [`SignalRecording::read`] reads a file, with the same faults.
     pub(crate) fn read(
         &self,
         file: &str,
         options: &ReadOptions,
     ) -> Result<SignalRecording, RecordingFault> {
+        // Each row becomes a sample; columns that are not needed are skipped by the intake.
         let mut intake = SampleIntake::new(self.names(), options)?;
         let samples = self.0.first().map_or(0, |(_, values)| values.len());
         let mut fields = vec![SampleField::NotFinite; self.0.len()];
@@ -60,7 +61,7 @@ impl MemoryTable {
         intake.finish(file)
     }
 
-    /// What it holds.
+    /// Its columns, its number of samples and its time range.
     pub(crate) fn table_info(&self) -> TableInfo {
         let names = self.names();
         TableInfo {

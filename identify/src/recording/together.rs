@@ -1,4 +1,4 @@
-//! Several files of one run: opened together, read each by itself, joined on their times.
+//! Several files of one run: opened together, read one by one, and joined on their times.
 
 use std::path::Path;
 
@@ -11,14 +11,16 @@ use crate::recording::notes::RecordingNote;
 use crate::recording::{ReadOptions, RecordingFile, SignalRecording};
 use crate::words::backquoted_list;
 
-/// Files of one run, whose columns are joined on time; most often there is one.
+/// The files of one run, whose columns are joined on time; usually there is one.
 pub struct RecordingFiles {
+    /// Names of all files, joined by `+`, for messages.
     name: String,
+    /// The open files, in the order of the user.
     files: Vec<RecordingFile>,
 }
 
 impl RecordingFiles {
-    /// Opens files; fails when one of them cannot be read, or there is none.
+    /// Opens files. Fails when one of them cannot be read, or when there is none.
     pub fn open(files: &dyn FileSource, paths: &[&Path]) -> Result<Self, RecordingError> {
         let opened = paths.iter().map(|path| RecordingFile::open(files, path));
         let files = opened.collect::<Result<Vec<_>, _>>()?;
@@ -37,7 +39,7 @@ impl RecordingFiles {
         })
     }
 
-    /// A table of columns in memory; `name` is what messages call it. Fails when columns differ in length.
+    /// Makes a recording of columns in memory; `name` is its name in messages. Fails when columns differ in length.
     pub fn from_table(
         name: &str,
         columns: Vec<(String, Vec<f64>)>,
@@ -49,12 +51,12 @@ impl RecordingFiles {
         })
     }
 
-    /// What messages call them.
+    /// Name of the files in messages.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Names of all columns, those of the first file first; a name that an earlier file has too stands once.
+    /// Names of all columns, those of the first file first; a name in several files occurs once.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
         let mut all = Vec::new();
         for file in &self.files {
@@ -69,14 +71,16 @@ impl RecordingFiles {
         Ok(all)
     }
 
-    /// Reads them; the column `t` of each file, or the one that stands for it, joins them.
+    /// Reads the files and joins them by their column `t`, or by the one that stands for it.
     ///
-    /// Fails as [`Recording::read`] does, when two files have a column that is needed, when a sum of columns takes them
-    /// from several files, and when the files have no time in common.
+    /// Fails as [`SignalRecording::read`] does, when two files have a needed column, when a sum of columns has terms
+    /// in several files, or when the files have no time in common.
     pub fn read(&self, options: &ReadOptions) -> Result<SignalRecording, RecordingError> {
+        // A single file needs no joining.
         if let [file] = self.files.as_slice() {
             return file.read(options);
         }
+        // Names are compared before anything is read.
         let names = self.files.iter().map(RecordingFile::names);
         let names = names.collect::<Result<Vec<_>, _>>()?;
         self.check_unique_sources(&names, options)?;
@@ -87,6 +91,7 @@ impl RecordingFiles {
             notes.extend(recording.notes().iter().cloned());
             parts.push(recording);
         }
+        // Columns keep their values in the parts to be joined; the rest of each column is kept here.
         let mut columns: Vec<(String, SignalColumn)> = Vec::new();
         let mut timed = Vec::new();
         let mut idle = Vec::new();
@@ -99,6 +104,7 @@ impl RecordingFiles {
                     columns.push((name, column));
                 }
             }
+            // A file without a needed column is reported and not joined.
             if values.is_empty() {
                 idle.push(recording.file.clone());
                 continue;
@@ -111,7 +117,7 @@ impl RecordingFiles {
         }
         if !idle.is_empty() {
             notes.push(RecordingNote::warning(format!(
-                "Nothing of {} is needed.",
+                "No column of {} is needed.",
                 backquoted_list(&idle)
             )));
         }
@@ -119,6 +125,7 @@ impl RecordingFiles {
         let Some(together) = together.map_err(|fault| self.fault(fault))? else {
             return Err(self.fault(RecordingFault::NoSamples));
         };
+        // Rows of the joined recording have numbers of their own.
         let lines = (1..=together.time.len() as u64).collect();
         for (place, values) in together.columns {
             columns[place].1.values = values;
@@ -139,12 +146,13 @@ impl RecordingFiles {
         })
     }
 
-    /// Fails when it is not clear from which file something comes.
+    /// Fails when a needed column or a computed column has no unique file.
     fn check_unique_sources(
         &self,
         names: &[Vec<String>],
         options: &ReadOptions,
     ) -> Result<(), RecordingError> {
+        // The time may be in every file, because it joins them.
         let time: Vec<&str> = time_names(options);
         for (k, of_file) in names.iter().enumerate() {
             for name in of_file {
@@ -158,6 +166,7 @@ impl RecordingFiles {
                 }
             }
         }
+        // All terms of a sum must be in one file.
         for computed in options.computed.iter().filter(|one| one.name != "t") {
             let is_whole = |names: &Vec<String>| {
                 let mut terms = computed.terms.iter();
@@ -172,6 +181,7 @@ impl RecordingFiles {
         Ok(())
     }
 
+    /// A fault of the joined recording.
     fn fault(&self, fault: RecordingFault) -> RecordingError {
         RecordingError {
             file: self.name.clone(),
@@ -180,7 +190,7 @@ impl RecordingFiles {
     }
 }
 
-/// Names that files may have for the time.
+/// Names of columns that files may use for the time.
 fn time_names(options: &ReadOptions) -> Vec<&str> {
     let renamed = options.renames.iter().filter(|(ours, _)| ours == "t");
     let computed = options.computed.iter().filter(|one| one.name == "t");
@@ -189,7 +199,7 @@ fn time_names(options: &ReadOptions) -> Vec<&str> {
     theirs.chain(terms).chain(std::iter::once("t")).collect()
 }
 
-/// The options as far as they are about the columns of one file.
+/// The options restricted to the columns of one file.
 fn options_for_file(options: &ReadOptions, names: &[String]) -> ReadOptions {
     let mut own = options.clone();
     own.renames.retain(|(_, theirs)| names.contains(theirs));

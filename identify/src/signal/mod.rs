@@ -1,4 +1,4 @@
-//! What is done with the numbers of one signal, whatever they mean: filters, spectra, statistics.
+//! Operations on the numbers of one signal, independent of their meaning: filters, spectra, statistics.
 
 mod filters;
 mod spectrum;

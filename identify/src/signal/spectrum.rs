@@ -1,18 +1,18 @@
-//! Power spectrum of a signal, for choices that depend on where motion ends and noise begins.
+//! Power spectrum of a signal, to separate motion from noise.
 //!
 //! Source: J. W. Cooley and J. W. Tukey (1965), radix 2, with zero padding; window by J. von Hann.
 
 use std::f64::consts::PI;
 
-/// Periodogram of the signal without its mean under a Hann window, from 0 to half the sampling
-/// rate, evenly spaced; in units that are the same for all frequencies but otherwise arbitrary.
-/// Empty when there are fewer than 4 samples.
+/// Periodogram of the signal without its mean under a Hann window, at even frequencies from 0 to half of the sampling
+/// rate. The unit is arbitrary but the same for all frequencies. Empty for fewer than 4 samples.
 pub(crate) fn hann_power(signal: &[f64]) -> Vec<f64> {
     let n = signal.len();
     if n < 4 {
         return Vec::new();
     }
     let mean = signal.iter().sum::<f64>() / n as f64;
+    // Zero padding to a power of two, for the fast transform.
     let padded = n.next_power_of_two();
     let mut re = vec![0.0; padded];
     let mut im = vec![0.0; padded];
@@ -29,6 +29,7 @@ pub(crate) fn hann_power(signal: &[f64]) -> Vec<f64> {
 fn transform(re: &mut [f64], im: &mut [f64]) {
     let n = re.len();
     let bits = n.trailing_zeros();
+    // Sort the samples by the reversed bits of their indices.
     for i in 0..n {
         let j = if bits == 0 {
             0
@@ -40,11 +41,13 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
             im.swap(i, j);
         }
     }
+    // Combine transforms of half the length, until the complete length is reached.
     let mut half = 1;
     while half < n {
         let twiddles: Vec<(f64, f64)> = (0..half)
             .map(|k| (-PI * k as f64 / half as f64).sin_cos())
             .collect();
+        // Butterflies of each block.
         for start in (0..n).step_by(2 * half) {
             for (k, (sin, cos)) in twiddles.iter().enumerate() {
                 let (a, b) = (start + k, start + k + half);

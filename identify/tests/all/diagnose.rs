@@ -8,6 +8,7 @@ use modelmill_identify::diagnose::{
     DiagnosisVerdict, EffectParameter, ForceColumn, LocatedEffect, ModelDiagnosis,
     NoColumnProvider, SampleLayout, SampleSegment, SignConstraint, diagnose, white_noise,
 };
+use modelmill_runtime::RandomBits;
 
 /// Samples of the fit, and as many of the check.
 const SAMPLES: usize = 1500;
@@ -15,22 +16,17 @@ const STEP: f64 = 0.004;
 /// Deviation of the force's noise; columns have a size near 1.
 const NOISE: f64 = 0.1;
 
-/// `SplitMix64` with Box and Muller's transform on top.
-struct Random(u64);
+/// Random numbers with Box and Muller's transform on top.
+struct Random(RandomBits);
 
 impl Random {
     fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
+        Self(RandomBits::new(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15)))
     }
 
     /// Uniform in `(0, 1]`.
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        ((z >> 11) as f64 + 1.0) / (1_u64 << 53) as f64
+        self.0.above_zero()
     }
 
     fn normal(&mut self) -> f64 {

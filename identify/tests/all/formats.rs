@@ -120,7 +120,7 @@ fn parquet_gives_numbers_times_and_nulls() {
         }
         let missing = recording.column("motor").unwrap_err().to_string();
         assert!(
-            missing.contains(", row 8: column `motor` holds `null or NaN`"),
+            missing.contains(", row 8: column `motor` contains `null or NaN`"),
             "{missing}"
         );
         let kept = SignalRecording::read_with(

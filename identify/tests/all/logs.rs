@@ -304,7 +304,7 @@ fn topics_are_joined_on_time() {
     );
     assert!(
         says.iter()
-            .any(|says| says.contains("`command` is taken at their times")),
+            .any(|says| says.contains("`command` is interpolated linearly to them")),
         "{says:?}"
     );
 }

@@ -6,26 +6,18 @@ use std::fmt::Write as _;
 use modelmill_identify::{
     PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation,
 };
+use modelmill_runtime::RandomBits;
 
 const RATE: f64 = 250.0;
 const PERIOD: f64 = 7.29;
 
-/// Seeded numbers, evenly spread over `[0, 1)` (S. Steele, D. Lea and C. Flood's `SplitMix64`).
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-}
-
 /// Position, rate and acceleration of a motion of seven harmonics that the seed chooses.
 fn motion(seed: u64, t: f64) -> [f64; 3] {
-    let mut state = seed;
+    let mut random = RandomBits::new(seed);
     let mut sum = [1.7, 0.0, 0.0];
     for k in 1..=7 {
         let w = TAU * f64::from(k) / PERIOD;
-        let (a, phase) = (0.12 * uniform(&mut state), TAU * uniform(&mut state));
+        let (a, phase) = (0.12 * random.below_one(), TAU * random.below_one());
         let (sin, cos) = (w * t + phase).sin_cos();
         sum[0] += a * sin;
         sum[1] += a * w * cos;
@@ -36,13 +28,12 @@ fn motion(seed: u64, t: f64) -> [f64; 3] {
 
 /// What an encoder of 20 bits with noise reads, prepared.
 fn prepared(seed: u64, samples: u32, smoothing: SmoothingMethod) -> PreparedRun {
-    let mut state = seed.wrapping_mul(77);
+    let mut random = RandomBits::new(seed.wrapping_mul(77));
     let step = TAU / f64::from(1 << 20);
     let mut text = "t,q\n".to_owned();
     for i in 0..samples {
         let t = f64::from(i) / RATE;
-        // Twelve uniform numbers add up to a normal one, nearly.
-        let noise = 4e-6 * ((0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0);
+        let noise = 4e-6 * random.nearly_normal();
         let read = ((motion(seed, t)[0] + noise) / step).round() * step;
         writeln!(text, "{t},{read:.9}").unwrap();
     }
@@ -84,7 +75,7 @@ fn two_periods_or_one_are_projected_on_their_series() {
             let run = prepared(seed, samples, SmoothingMethod::default());
             let note = run.notes[0].says.in_library_words();
             assert!(
-                note.contains("with 7 harmonics, since it leaves nothing but white noise"),
+                note.contains("with 7 harmonics, because its residual is white noise"),
                 "seed {seed}, {samples} samples: {note}"
             );
             assert_eq!(run.samples(), samples as usize);

@@ -40,12 +40,12 @@ fn files_that_are_no_recordings() {
     );
     check_refused(
         "0.0,1.5\n0.1,1.6\n",
-        "run.csv, line 1: the first line holds numbers, but column names are expected there; \
+        "run.csv, line 1: the first line contains numbers, but column names are expected there; \
          put a line such as `t,theta1,spindle_left` on top",
     );
     check_refused(
         "t q force\n0 1 2\n",
-        "run.csv, line 1: it cannot be told what separates the columns of `t q force`; \
+        "run.csv, line 1: the separator of the columns is not clear in `t q force`; \
          use a comma (or `;` or a tab) throughout and a point for decimals",
     );
     check_refused(
@@ -154,12 +154,12 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
     assert_eq!(recording.column("t").unwrap(), [0.0, 0.1, 0.2, 0.3]);
     assert_eq!(
         recording.column("q").unwrap_err().to_string(),
-        "run.csv, line 3: column `q` holds `abc` where a number is expected \
-         (2 fields of the column are no numbers); correct or remove it"
+        "run.csv, line 3: column `q` contains `abc` where a number is expected \
+         (2 fields of the column are not numbers); correct or remove it"
     );
     assert_eq!(
         recording.column("f").unwrap_err().to_string(),
-        "run.csv, line 2: column `f` holds `NaN` where a finite number is expected \
+        "run.csv, line 2: column `f` contains `NaN` where a finite number is expected \
          (3 fields of the column are not finite or empty); \
          repair the recording, or leave such samples out with option `skip_bad_samples` (they are counted)"
     );
@@ -168,11 +168,9 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         .iter()
         .map(|note| note.says.in_library_words())
         .collect();
-    assert!(
-        says.iter().any(
-            |s| s.contains("Column `remark` of run.csv holds text that is no number (2 fields")
-        )
-    );
+    assert!(says.iter().any(|s| {
+        s.contains("Column `remark` of run.csv contains text that is not a number (2 fields")
+    }));
     let decimal_comma = read("t;q\n0;1,5\n1;1,6\n").unwrap();
     assert!(
         decimal_comma
@@ -223,19 +221,19 @@ fn renamings_and_missing_columns() {
     );
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
-        "run.csv: there is no column `t`; is `t_s` meant? The columns are: `t_s`, `theta1`, `F_left`. \
+        "run.csv: there is no column `t`; did you mean `t_s`? The columns are: `t_s`, `theta1`, `F_left`. \
          Map one onto it with option `columns` = `t=t_s`."
     );
     assert_eq!(
         read(&[("spindle_left", "F_lefd")]).unwrap_err().to_string(),
-        "run.csv: a renaming asks for the column `F_lefd`, which is not there; is `F_left` meant? \
+        "run.csv: a renaming refers to the column `F_lefd`, which is not there; did you mean `F_left`? \
          The columns are: `t_s`, `theta1`, `F_left`. Renamings read option `columns` = `ours=theirs`."
     );
     assert!(
         read(&[("theta1", "F_left")])
             .unwrap_err()
             .to_string()
-            .contains("a renaming brings this about")
+            .contains("a renaming causes this")
     );
     assert!(matches!(
         read(&[("a", "t_s"), ("a", "F_left")]).unwrap_err().fault,

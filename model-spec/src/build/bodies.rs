@@ -1,4 +1,7 @@
-//! Parts and lumped masses: what has inertia.
+//! Parts and lumped masses: everything that has inertia.
+//!
+//! The tables `part` and `lumped_mass` go in; masses, centres and inertias as exact expressions come out. All of them
+//! are polynomials in the parameters, as the regressor requires.
 
 use num_rational::BigRational;
 use num_traits::One;
@@ -16,9 +19,11 @@ use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 use crate::values::{FormulaVector, LumpedMassPlace};
 
+/// Sorts of names in masses and inertias.
 const SORTS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Parameter];
 
-/// Reads the parts.
+/// Reads the parts. A part without a name has that of its frame; an unknown frame is reported and replaced by the
+/// base.
 pub(super) fn parts(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -36,6 +41,7 @@ pub(super) fn parts(
             let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
             let frame = frame.unwrap_or(FrameIdx(0));
             ModelPart {
+                // Without a name of its own a part is called after its frame.
                 name: entry.name.as_ref().map_or_else(
                     || tree.frames[frame.0].name.clone(),
                     |name| name.text.clone(),
@@ -48,11 +54,13 @@ pub(super) fn parts(
 }
 
 /// Reports names that occur twice in a list.
+/// `what` names the list in messages.
 pub(super) fn check_unique<'a>(
     what: &str,
     names: impl Iterator<Item = &'a SpannedName>,
     log: &mut DiagnosticLog,
 ) {
+    // Maps each name to the place of its last occurrence.
     let mut seen = std::collections::BTreeMap::new();
     for name in names {
         if let Some(first) = seen.insert(&name.text, name.span) {
@@ -61,6 +69,8 @@ pub(super) fn check_unique<'a>(
     }
 }
 
+/// The inertia of a part, from `linear` or from `mass`, `centre` and `inertia`.
+/// A part with both descriptions is reported, and `linear` is used.
 fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     let about_centre = entry.mass.is_some() || entry.centre.is_some() || entry.inertia.is_some();
     if let Some(linear) = &entry.linear {
@@ -72,6 +82,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
         }
         return linear_inertial(linear, symbols, log);
     }
+    // A part with nothing at all is a mistake, unless its entries could not be read.
     if !about_centre && !log.syntax_broken && !entry.faulty {
         log.push(
             Diagnostic::error(entry.span, "this part has neither mass nor inertia")
@@ -79,6 +90,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
                 .help("for example `mass = \"m1\"`, `centre = [\"dc1\", 0, 0]`, `inertia = { zz = \"Ic12\" }`; or `linear = { planar = \"1\" }`"),
         );
     }
+    // The six entries in the order xx, xy, xz, yy, yz, zz; omitted ones are zero.
     let inertia = entry.inertia.as_ref();
     let entries = [
         inertia.and_then(|inertia| inertia.xx.as_ref()),
@@ -88,6 +100,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
         inertia.and_then(|inertia| inertia.yz.as_ref()),
         inertia.and_then(|inertia| inertia.zz.as_ref()),
     ];
+    // All entries are resolved even if some are faulty, so that all faults are reported.
     PartInertia::AboutCentre {
         mass: quantity(
             entry.mass.as_ref(),
@@ -102,6 +115,7 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
     }
 }
 
+/// The ten linear parameters of a part: single entries first, then those of the shorthand, else zero.
 fn linear_inertial(
     linear: &LinearEntry,
     symbols: &SymbolTable,
@@ -116,24 +130,29 @@ fn linear_inertial(
             .label("expected only one of `all` and `planar`"),
         );
     }
+    // The shorthand `all` or `planar`, if the part has one.
     let short = shorthand(linear);
+    // An explicit expression replaces the parameter of the shorthand.
     let entry = |symbol: &str, dimension: UnitDimension, log: &mut DiagnosticLog| {
         if let Some(formula) = explicit_entry(linear, symbol) {
             let what = format!("{symbol} of a part");
             return quantity(Some(formula), symbols, dimension, &what, log);
         }
+        // Without either, the entry is exactly zero, so that its column never appears.
         let Some((suffix, _)) = short.filter(|(_, members)| members.contains(&symbol)) else {
             return ExactExpression::zero();
         };
         let name = format!("{symbol}{}", suffix.text);
-        // Declared above; where that failed, the fault is reported already.
+        // The shorthand was declared before; if that failed, the fault is reported already.
         let Some(meaning) = symbols.scope.get(&name) else {
             return ExactExpression::zero();
         };
+        // A parameter of a shorthand counts as used, because the part contains it.
         meaning.used.set(true);
         meaning.exact.clone()
     };
     let mut values = LINEAR.map(|(symbol, dimension)| entry(symbol, dimension, log));
+    // The order of LINEAR: six entries of the inertia, three first moments, the mass.
     let mut take = |i: usize| std::mem::replace(&mut values[i], ExactExpression::zero());
     PartInertia::Linear {
         inertia: std::array::from_fn(&mut take),
@@ -142,7 +161,8 @@ fn linear_inertial(
     }
 }
 
-/// An expression over constants and parameters, polynomial in the parameters; zero where absent or faulty.
+/// Resolves an expression over constants and parameters, polynomial in the parameters; zero if absent or faulty.
+/// `what` names the quantity in messages.
 fn quantity(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -158,6 +178,7 @@ fn quantity(
         dimension,
         what,
     };
+    // The scope reports unknown names and wrong units.
     let Some(exact) = symbols.scope.resolve(formula, wanted, log) else {
         return ExactExpression::zero();
     };
@@ -165,6 +186,8 @@ fn quantity(
     exact
 }
 
+/// Resolves a position in a frame, m; zero if absent or faulty.
+/// `what` names the position in messages.
 fn position(
     vector_entry: Option<&FormulaVector>,
     symbols: &SymbolTable,
@@ -179,6 +202,7 @@ fn position(
         dimension: UnitDimension::LENGTH,
         what,
     };
+    // Entries are resolved first; each one must also be polynomial in the parameters.
     let position = vector(entry, &symbols.scope, wanted, log);
     for (exact, formula) in position.iter().zip(&entry.entries) {
         if let Some(formula) = formula {
@@ -188,6 +212,8 @@ fn position(
     position
 }
 
+/// Reports an expression that is not a polynomial in the parameters.
+/// Division by a parameter is the usual cause; a quantity in a divisor must be a constant.
 fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut DiagnosticLog) {
     if !is_polynomial(exact) {
         log.push(
@@ -198,17 +224,22 @@ fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut Diagnos
     }
 }
 
+/// Whether an expression is a polynomial in the parameters; constants may occur anywhere.
 fn is_polynomial(exact: &ExactExpression) -> bool {
+    // Subexpressions without parameters are unrestricted.
     let free = |exact: &ExactExpression| {
         !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
     };
+    // Sums, products and non-negative powers of polynomials are polynomials.
     match exact {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => true,
         ExactExpression::Sum(inner) | ExactExpression::Product(inner) => {
             inner.iter().all(is_polynomial)
         }
         ExactExpression::Negative(inner) => is_polynomial(inner),
+        // Divisors and operands of functions must be free of parameters.
         ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
+        // A negative exponent divides by the base.
         ExactExpression::Power(base, exponent) => {
             if *exponent >= 0 {
                 is_polynomial(base)
@@ -228,6 +259,7 @@ pub(super) fn lumped_masses(
     points: &PointTable,
     log: &mut DiagnosticLog,
 ) -> Vec<LumpedMass> {
+    // A name is needed only to override a lumped mass in a variant, but it must be unique.
     let entries = model.lumped_mass.iter().flat_map(|list| &list.entries);
     check_unique(
         "lumped mass",
@@ -239,6 +271,8 @@ pub(super) fn lumped_masses(
         .collect()
 }
 
+/// Reads one lumped mass; its frame is that of `on`, or that of the first point it names.
+/// Its place may differ between the two balances, `force_at` and `moment_at`.
 fn lumped_mass(
     entry: &LumpedMassEntry,
     symbols: &SymbolTable,
@@ -246,7 +280,9 @@ fn lumped_mass(
     points: &PointTable,
     log: &mut DiagnosticLog,
 ) -> LumpedMass {
+    // Any of the three places may name the point that decides the frame.
     let spots = [&entry.at, &entry.force_at, &entry.moment_at];
+    // The frame of a named point is used where `on` is absent.
     let named = spots.iter().find_map(|spot| match spot {
         Some(LumpedMassPlace::Point(name)) => points.get(&name.text),
         _ => None,
@@ -255,6 +291,7 @@ fn lumped_mass(
         (Some(on), _) => tree.find(on, log).unwrap_or(FrameIdx(0)),
         (None, Some(point)) => points.points[point.0].frame,
         (None, None) => {
+            // An unknown point is reported where its position is read.
             if !log.syntax_broken
                 && !entry.faulty
                 && !spots
@@ -263,13 +300,14 @@ fn lumped_mass(
             {
                 log.push(
                     Diagnostic::error(entry.span, "this lumped mass sits on no frame")
-                        .label("expected `on`, the name of a frame, beside a position")
+                        .label("expected `on`, the name of a frame, together with a position")
                         .help("add `on = \"...\"`, or name a point in `at`"),
                 );
             }
             FrameIdx(0)
         }
     };
+    // Both balances need a place; `at` serves as the default of both.
     let lacking = match (&entry.at, &entry.force_at, &entry.moment_at) {
         (None, None, None) => Some("at"),
         (None, None, Some(_)) => Some("force_at"),
@@ -280,9 +318,10 @@ fn lumped_mass(
         log.push(
             Diagnostic::error(entry.span, "this lumped mass has no place")
                 .label(format!("expected `{key}`, the name of a point or a vector"))
-                .help("`at` serves both balances; `force_at` and `moment_at` differ from it where they are given"),
+                .help("`at` is the place in both balances; `force_at` and `moment_at` replace it in one of them"),
         );
     }
+    // Each balance has its own place, else the common one.
     let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
     let moment_at = entry.moment_at.as_ref().or(entry.at.as_ref());
     LumpedMass {
@@ -300,8 +339,10 @@ fn lumped_mass(
     }
 }
 
-/// Warns of masses and moments of inertia whose nominal values are negative.
+/// Warns of masses and moments of inertia whose values are negative at the nominal parameters.
+/// These are warnings only, because the equations stay valid.
 pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &mut DiagnosticLog) {
+    // Evaluates a quantity and reports it with its value if it is negative.
     let mut look = |exact: &ExactExpression, what: &str, unit: &str, span: SourceSpan| {
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         if value < 0.0 {
@@ -311,13 +352,15 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
                     format!("with nominal values {what} is {value} {unit}"),
                 )
                 .label("expected a positive value")
-                .help("check the signs here and of the nominal values of what stands here"),
+                .help("check the sign of this entry and of the nominal values of the names in it"),
             );
         }
     };
+    // The mark is on the formula if there is one, else on the place given instead.
     let place =
         |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
+    // Find the formulas of the mass and of the three moments of inertia, for the place of the warning.
     for (entry, part) in parts.zip(&mechanism.parts) {
         let (mass, inertia, formulas, or) = match (&part.inertial, &entry.linear) {
             (PartInertia::Linear { mass, inertia, .. }, Some(linear)) => {
@@ -330,6 +373,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
                 | PartInertia::Linear { mass, inertia, .. },
                 _,
             ) => {
+                // A part about its centre has formulas in `mass` and `inertia`.
                 let axes = entry.inertia.as_ref();
                 let formulas = [
                     entry.mass.as_ref(),
@@ -343,11 +387,13 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
         let [m, x, y, z] = formulas.map(|formula| place(formula, or));
         let part = &part.name;
         look(mass, &format!("the mass of `{part}`"), "kg", m);
+        // Positions of the diagonal in xx, xy, xz, yy, yz, zz.
         for (axis, i, span) in [("x", 0, x), ("y", 3, y), ("z", 5, z)] {
             let what = format!("the moment of inertia of `{part}` about {axis}");
             look(&inertia[i], &what, "kg m^2", span);
         }
     }
+    // Lumped masses have no names that are always there, so the place in the file identifies them.
     let lumped = model.lumped_mass.iter().flat_map(|list| &list.entries);
     for (entry, lumped) in lumped.zip(&mechanism.lumped_masses) {
         let span = place(entry.mass.as_ref(), entry.span);
@@ -355,6 +401,8 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
     }
 }
 
+/// The share of a lumped mass as a rational number; 1 if absent or faulty.
+/// Factors of any other kind belong into `mass`.
 fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRational {
     let Some(formula) = formula else {
         return BigRational::one();
@@ -369,6 +417,8 @@ fn mass_share(formula: Option<&SourceFormula>, log: &mut DiagnosticLog) -> BigRa
     })
 }
 
+/// The position of a lumped mass in its frame, m, from a vector or a point; zero if absent or faulty.
+/// A named point must be fixed to the frame of the mass.
 fn lumped_mass_position(
     spot: Option<&LumpedMassPlace>,
     frame: FrameIdx,
@@ -386,6 +436,7 @@ fn lumped_mass_position(
             position(Some(vector), symbols, "the place of a lumped mass", log)
         }
         LumpedMassPlace::Point(name) => {
+            // An unknown point is reported by the lookup.
             let Some(idx) = points.find(name, log) else {
                 return nowhere();
             };

@@ -1,4 +1,6 @@
 //! Coordinates that follow others: gears, belts, screws, differentials.
+//!
+//! The entry `follows` of a coordinate goes in; an affine function of other coordinates comes out.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +13,7 @@ use crate::mechanism::CoordinateCoupling;
 use crate::schema::{CoordinateEntry, ModelEntry};
 use crate::scope::{FormulaRequirement, SymbolSort};
 
-/// Reads the couplings and gives what follows its nominal value.
+/// Reads the couplings and sets the nominal value of each coordinate that follows others.
 pub(super) fn couplings(
     model: &ModelEntry,
     symbols: &mut SymbolTable,
@@ -19,6 +21,7 @@ pub(super) fn couplings(
     log: &mut DiagnosticLog,
 ) -> Vec<CoordinateCoupling> {
     let mut found: Vec<(CoordinateCoupling, SourceSpan)> = Vec::new();
+    // Coordinates that could not be declared are reported already.
     for (key, entry) in model.coordinates.iter().flat_map(|table| &table.entries) {
         let Some(follows) = &entry.follows else {
             continue;
@@ -26,18 +29,20 @@ pub(super) fn couplings(
         let Some(i) = symbols.coordinates.iter().position(|c| c.name == key.name) else {
             continue;
         };
+        // The value and the drive of such a coordinate cannot be chosen.
         reject_unused_fields(entry, key.span, log);
         if let Some(coupling) = coupling(follows, CoordinateIdx(i), symbols, log) {
             found.push((coupling, follows.ast.span));
         }
     }
+    // Nominal values are computed only if all couplings are valid.
     if log.n_errors() == 0 {
         set_nominal(&found, symbols, places, log);
     }
     found.into_iter().map(|(coupling, _)| coupling).collect()
 }
 
-/// Says what else is given that follows already.
+/// Reports entries of a coordinate that `follows` determines already.
 fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut DiagnosticLog) {
     let given = [
         (entry.nominal.is_some(), "nominal"),
@@ -49,7 +54,7 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
             log.push(
                 Diagnostic::error(
                     span,
-                    format!("`{name}` says nothing of a coordinate that follows others"),
+                    format!("`{name}` has no effect on a coordinate that follows others"),
                 )
                 .label(format!("delete `{name}`")),
             );
@@ -57,6 +62,8 @@ fn reject_unused_fields(entry: &CoordinateEntry, span: SourceSpan, log: &mut Dia
     }
 }
 
+/// The coupling of one coordinate; reports an expression that is not affine in others or contains a quaternion.
+/// The dimension of the expression must be that of the coordinate: an angle or a length.
 fn coupling(
     follows: &SourceFormula,
     coordinate: CoordinateIdx,
@@ -69,25 +76,31 @@ fn coupling(
         dimension: own.motion.dimension(),
         what: "what this coordinate follows",
     };
+    // The scope reports unknown names and wrong units; the shape is checked below.
     let exact = symbols.scope.resolve(follows, wanted, log)?;
     let span = follows.ast.span;
     let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
         log.push(
-            Diagnostic::error(span, "a coordinate follows others in proportion")
-                .label("expected a sum of coordinates, each times constants, and of constants")
-                .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
+            Diagnostic::error(
+                span,
+                "a coordinate can only be an affine function of others",
+            )
+            .label("expected a sum of coordinates, each times constants, and of constants")
+            .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
         );
         return None;
     };
     let terms: Vec<(CoordinateIdx, ExactExpression)> = terms.into_iter().collect();
+    // An expression without coordinates would fix the coordinate.
     if terms.is_empty() {
         log.push(
             Diagnostic::error(span, "this follows no coordinate")
                 .label("expected the name of a coordinate in it")
-                .help("what stands still needs no coordinate: write the constant into the frame"),
+                .help("a constant needs no coordinate: write it into the frame"),
         );
         return None;
     }
+    // Components of a unit quaternion are not independent of each other.
     let all = terms.iter().map(|(i, _)| *i).chain([coordinate]);
     if let Some(i) = all
         .into_iter()
@@ -107,15 +120,18 @@ fn coupling(
     })
 }
 
-/// Puts what follows at its nominal value; what follows itself is reported.
+/// Computes nominal values in the order of dependence; a coordinate that follows itself is reported.
+/// `found` has the couplings with their places.
 fn set_nominal(
     found: &[(CoordinateCoupling, SourceSpan)],
     symbols: &mut SymbolTable,
     places: &MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Each pass takes one coupling whose coordinates all have their values; if there is none, there is a cycle.
     let mut left: Vec<&(CoordinateCoupling, SourceSpan)> = found.iter().collect();
     while !left.is_empty() {
+        // A coupling waits while one of its coordinates has no value yet.
         let waits = |coupling: &CoordinateCoupling| {
             let mut terms = coupling.terms.iter();
             terms.any(|(i, _)| left.iter().any(|(other, _)| other.coordinate == *i))
@@ -130,12 +146,13 @@ fn set_nominal(
                         symbols.coordinates[coupling.coordinate.0].name
                     ),
                 )
-                .label("by way of what it follows")
+                .label("through the coordinates that it follows")
                 .related(*span, "it follows this")
-                .help("one of the coordinates has to move by itself"),
+                .help("one of these coordinates must be independent"),
             );
             return;
         };
+        // All coordinates of this coupling have their values now.
         let (coupling, _) = left.remove(next);
         let value = |symbol: ModelSymbol| match symbol {
             ModelSymbol::Coordinate(i) => symbols.coordinates[i.0].nominal,
@@ -146,13 +163,16 @@ fn set_nominal(
     }
 }
 
-/// An expression as a sum of multiples of coordinates, and what is left.
+/// An expression as a sum of multiples of coordinates, and a term without coordinates.
 struct CoordinateSum {
+    /// Factor of each coordinate.
     terms: BTreeMap<CoordinateIdx, ExactExpression>,
+    /// The term without coordinates.
     offset: ExactExpression,
 }
 
 impl CoordinateSum {
+    /// A value that contains no coordinate.
     fn without_coordinates(offset: ExactExpression) -> Self {
         Self {
             terms: BTreeMap::new(),
@@ -160,7 +180,8 @@ impl CoordinateSum {
         }
     }
 
-    /// Does the same to every factor and to the rest.
+    /// Applies a linear function to every factor and to the offset; an offset of zero stays zero.
+    /// `f` must map zero to zero.
     fn map(self, f: impl Fn(ExactExpression) -> ExactExpression) -> Self {
         let terms = self.terms.into_iter();
         Self {
@@ -174,28 +195,33 @@ impl CoordinateSum {
     }
 }
 
-/// `None` where a coordinate stands otherwise than in proportion.
+/// Splits an expression into multiples of coordinates; `None` if it is not affine in them.
 fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
+    // Subexpressions without coordinates are kept as they are.
     let mut moves = false;
     exact.for_each_symbol(&mut |symbol| moves |= matches!(symbol, ModelSymbol::Coordinate(_)));
     if !moves {
         return Some(CoordinateSum::without_coordinates(exact.clone()));
     }
+    // The rules of an affine function: linear in each term, and products with at most one moving factor.
     match exact {
         ExactExpression::Symbol(ModelSymbol::Coordinate(i)) => Some(CoordinateSum {
             terms: BTreeMap::from([(*i, ExactExpression::unity())]),
             offset: ExactExpression::zero(),
         }),
+        // A sign applies to all factors and to the offset.
         ExactExpression::Negative(inner) => {
             Some(coordinate_sum(inner)?.map(|x| ExactExpression::Negative(Box::new(x))))
         }
         ExactExpression::Quotient(above, below) => {
+            // A divisor must be free of coordinates.
             let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
             let divided =
                 |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
             Some(coordinate_sum(above)?.map(divided))
         }
         ExactExpression::Product(factors) => {
+            // At most one factor may contain coordinates; all others multiply its terms.
             let mut moving: Option<CoordinateSum> = None;
             let mut others = Vec::new();
             for factor in factors {
@@ -207,6 +233,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
                 }
             }
             let times = |x: ExactExpression| {
+                // Factors of one are dropped to keep the expression short.
                 let one = (x != ExactExpression::unity()).then_some(x);
                 let mut all: Vec<ExactExpression> = others.iter().cloned().chain(one).collect();
                 match all.len() {
@@ -217,12 +244,14 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
             };
             Some(moving?.map(times))
         }
+        // Terms without coordinates are collected into the offset.
         ExactExpression::Sum(terms) => {
             let mut sum = CoordinateSum::without_coordinates(ExactExpression::zero());
             let mut fixed = Vec::new();
             for term in terms {
                 let found = coordinate_sum(term)?;
                 for (i, factor) in found.terms {
+                    // Factors of the same coordinate are added.
                     let all = match sum.terms.remove(&i) {
                         Some(before) => ExactExpression::Sum(vec![before, factor]),
                         None => factor,
@@ -233,6 +262,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
                     fixed.push(found.offset);
                 }
             }
+            // The offset is a sum only if it has at least two terms.
             sum.offset = match fixed.len() {
                 0 => ExactExpression::zero(),
                 1 => fixed.remove(0),

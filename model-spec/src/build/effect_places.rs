@@ -1,4 +1,6 @@
-//! The places of an effect: what their names mean, and what they carry.
+//! The places of an effect: what their names refer to, and the load of each.
+//!
+//! Names go in; an [`EffectPlace`] each and the common [`PlaceLoad`] come out. Faults are reported.
 
 use crate::build::frames::PointTable;
 use crate::build::symbols::SymbolTable;
@@ -14,15 +16,21 @@ use crate::schema::EffectKindEntry;
 use crate::suggest;
 use crate::values::SpannedName;
 
-/// What an effect may act on, beside the coordinates.
+/// Everything that an effect may act on, in addition to the coordinates.
 pub(crate) struct EffectTargets<'a> {
+    /// Drives with rows of the equation of motion.
     pub(crate) drives: &'a [ModelDrive],
+    /// Named points.
     pub(crate) points: &'a PointTable,
+    /// Rigid bodies.
     pub(crate) parts: &'a [ModelPart],
+    /// Lumped masses, without names that an effect could use.
     pub(crate) lumped_masses: &'a [LumpedMass],
 }
 
-/// Finds a place by its name; where several things bear it, the one that the kind may act on.
+/// Finds a place by its name. If several things have that name, the kind of effect decides which one is used.
+/// `allowed` are the sorts of places of the kind; `scene` has the parts of the mechanism. An unknown name is
+/// reported.
 pub(super) fn find_place(
     name: &SpannedName,
     allowed: &[ActsOn],
@@ -30,16 +38,18 @@ pub(super) fn find_place(
     scene: &EffectTargets<'_>,
     log: &mut DiagnosticLog,
 ) -> Option<EffectPlace> {
+    // Parts are looked up lazily, because most effects act on drives.
     let part = || {
         let at = scene.parts.iter().position(|part| part.name == name.text)?;
         Some(EffectPlace::Part(PartIdx(at)))
     };
+    // The reserved names for the complete base and for the measured forces.
     let whole = match name.text.as_str() {
         "base" => Some((ActsOn::Base, EffectPlace::Base)),
         "force" => Some((ActsOn::Force, EffectPlace::Force)),
         _ => None,
     };
-    // Parts and the whole have names of their own, which a drive or a point may bear as well: the kind tells.
+    // Parts, the base and the forces have names of their own, which a drive or a point may have as well.
     if let Some((_, place)) = whole.filter(|(sort, _)| allowed.contains(sort)) {
         return Some(place);
     }
@@ -48,6 +58,7 @@ pub(super) fn find_place(
     {
         return Some(place);
     }
+    // Names of drives, coordinates and points differ from each other, so their order does not matter.
     if let Some(idx) = scene
         .drives
         .iter()
@@ -55,6 +66,7 @@ pub(super) fn find_place(
     {
         return Some(EffectPlace::Drive(DriveIdx(idx)));
     }
+    // Next come coordinates, then points, and at the end parts for kinds that do not act on them.
     let coordinate = symbols
         .coordinates
         .iter()
@@ -65,9 +77,11 @@ pub(super) fn find_place(
     if let Some(idx) = scene.points.get(&name.text) {
         return Some(EffectPlace::Point(idx));
     }
+    // A place of the wrong sort is returned, too: `common_load` reports it with a better message.
     if let Some(place) = part().or(whole.map(|(_, place)| place)) {
         return Some(place);
     }
+    // Unknown: the advice lists only names on which this kind may act.
     let mut known: Vec<&str> = Vec::new();
     let expected = match allowed {
         [ActsOn::Part] => {
@@ -89,6 +103,7 @@ pub(super) fn find_place(
             "the name of a drive, a coordinate or a point"
         }
     };
+    // A place that a variant removes is reported with the place of the removal.
     if !log.is_full() {
         let removal = log.removal(&["drive", "coordinates", "point", "part"], &name.text);
         log.push(
@@ -102,7 +117,10 @@ pub(super) fn find_place(
     None
 }
 
-/// What the places of an effect carry; they must all carry the same, and the kind must be allowed there.
+/// The load of the places of an effect. All places must have the same load, and the kind must be allowed there.
+///
+/// `None` after any fault, each of which is reported.
+/// `places` belong to the names `at`, in the same order.
 pub(super) fn common_load(
     kind: &EffectKindEntry,
     at: &OneOrMany<SpannedName>,
@@ -114,11 +132,14 @@ pub(super) fn common_load(
     let carried = |kind: DriveKind| kind.place_load(&symbols.coordinates);
     let names = &at.entries;
     let kind_name = kind.name.as_ref().map_or("", |name| name.text.as_str());
+    // The load of the first place, which all others must share.
     let mut common: Option<PlaceLoad> = None;
     let mut fine = true;
+    // A kind with `other` acts at its first place only; the second one gives its motion.
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
     if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
     {
+        // The second place gives its motion only, so it is checked for its motion and for being another place.
         fine = has_motion(motion, other, *place, &carried, drives, log);
         if first.text == other.text {
             log.push(
@@ -128,6 +149,7 @@ pub(super) fn common_load(
             fine = false;
         }
     }
+    // Each place on which the kind acts: its sort, its units, duplicates, and equal loads.
     for (i, (name, place)) in names.iter().zip(places).enumerate().take(n_acting) {
         let (sort, carries) = match place {
             EffectPlace::Drive(idx) => (ActsOn::Drive, carried(drives[idx.0].kind)),
@@ -148,7 +170,8 @@ pub(super) fn common_load(
             fine = false;
             continue;
         }
-        // What mechanics need of their places is checked with them.
+        // Places of mechanics are checked with the mechanics.
+        // The kind must have units for the load of this place.
         if kind.mechanics.is_none() && !symbols_without_unit(kind, carries).is_empty() {
             log.push(
                 Diagnostic::error(name.span, format!("`{kind_name}` cannot act here"))
@@ -162,6 +185,7 @@ pub(super) fn common_load(
             fine = false;
             continue;
         }
+        // The same place twice would double the effect.
         if names[..i].iter().any(|other| other.text == name.text) {
             log.push(
                 Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
@@ -169,6 +193,7 @@ pub(super) fn common_load(
             );
             fine = false;
         }
+        // One parameter cannot be both a force and a torque.
         match common {
             Some(first) if first != carries => {
                 log.push(
@@ -184,7 +209,9 @@ pub(super) fn common_load(
             _ => common = Some(carries),
         }
     }
+    // Kinds that couple two places, and some mechanics, need an exact number of them.
     if let Some(n) = n_places(kind).filter(|n| *n != names.len()) {
+        // The reason in the advice depends on how the kind uses its places.
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
             _ if kind.mechanics.is_some() => {
@@ -209,7 +236,8 @@ pub(super) fn common_load(
     common.filter(|_| fine)
 }
 
-/// Whether a place moves as a kind asks of its other one.
+/// Whether the second place of an effect moves as its kind requires; reports it otherwise.
+/// `carried` gives the load of a drive: a torque for revolute motion, a force for prismatic motion.
 fn has_motion(
     motion: OtherMotion,
     name: &SpannedName,
@@ -218,6 +246,7 @@ fn has_motion(
     drives: &[ModelDrive],
     log: &mut DiagnosticLog,
 ) -> bool {
+    // Only drives and coordinates move.
     let carries = match place {
         EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
         EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
@@ -235,10 +264,10 @@ fn has_motion(
     log.push(
         Diagnostic::error(
             name.span,
-            format!("`{}` does not move as this kind asks", name.text),
+            format!("`{}` does not move as this kind requires", name.text),
         )
         .label(expected)
-        .help("the kind says in `other` whether its other place is an `angle` or a `length`"),
+        .help("the kind states in `other` whether its other place is an `angle` or a `length`"),
     );
     false
 }

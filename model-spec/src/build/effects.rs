@@ -1,4 +1,7 @@
-//! Effects of a file, by the kinds of the library and its own.
+//! Effects of a file, of kinds from the library and from the file itself.
+//!
+//! The table `effect` goes in; effects with their places, terms, constants and bodies come out. Parameters that they
+//! introduce are added to those of the file.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +24,8 @@ use crate::suggest;
 use crate::unit::{ModelUnit, UnitDimension};
 use crate::values::SpannedName;
 
-/// Reads the effects; their parameters join those of the file.
+/// Reads the effects and adds their parameters to those of the file.
+/// `own_kinds` are kinds of the model file and of its libraries; those of the program are added here.
 pub(super) fn effects(
     model: &ModelEntry,
     own_kinds: &[&EffectKindEntry],
@@ -29,6 +33,7 @@ pub(super) fn effects(
     scene: &EffectTargets<'_>,
     log: &mut DiagnosticLog,
 ) -> Vec<ModelEffect> {
+    // All kinds are checked once, before any effect uses them.
     let kinds = kinds(own_kinds, log);
     let entries = model.effect.iter().flat_map(|list| &list.entries);
     check_unique(
@@ -36,7 +41,8 @@ pub(super) fn effects(
         entries.clone().filter_map(|entry| entry.name.as_ref()),
         log,
     );
-    // What couples two places may couple each with a third.
+    // Effects that couple two places may share one of them with another effect.
+    // For kinds with exactly two places: whether they act on both. `None` for all other kinds.
     let couples = |entry: &EffectEntry| {
         let kind = entry
             .kind
@@ -47,6 +53,7 @@ pub(super) fn effects(
             (n_places(kind) == Some(2)).then_some(both_ways)
         })
     };
+    // Checks that compare effects with each other come first.
     warn_of_twins(entries.clone(), &couples, log);
     check_single(entries.clone(), &kinds, log);
     entries
@@ -54,12 +61,14 @@ pub(super) fn effects(
         .collect()
 }
 
-/// Reports what is one property of the whole, such as a tilt, and acts twice.
+/// Reports kinds that describe one property of the complete mechanism, such as a tilt of gravity, if they occur
+/// twice.
 fn check_single<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     kinds: &KindTable<'_>,
     log: &mut DiagnosticLog,
 ) {
+    // Kinds are compared by their mechanics, so that own kinds with other names count as equal.
     let mut seen: Vec<(Mechanics, SourceSpan)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
         let kind = kinds.get(name.text.as_str());
@@ -81,25 +90,29 @@ fn check_single<'a>(
     }
 }
 
-/// Warns of a kind that acts twice at one place with the same constants: the columns are equal, and a variant that means
-/// to override an effect without a name brings this about. What couples places is a twin if it couples the same ones;
-/// `couples` says whether it does so both ways.
+/// Warns of a kind that acts twice at one place with the same constants. Its columns are then equal. A common cause
+/// is a variant that is meant to override an effect without a name. Effects that couple two places are compared by
+/// both places; `couples` states whether the order of the places matters (`Some(false)`) or not (`Some(true)`).
 fn warn_of_twins<'a>(
     entries: impl Iterator<Item = &'a EffectEntry>,
     couples: &dyn Fn(&EffectEntry) -> Option<bool>,
     log: &mut DiagnosticLog,
 ) {
+    // Each kind at each place, with the first effect that has it.
     let mut seen: BTreeMap<(&str, Vec<&str>), (&EffectEntry, &SpannedName)> = BTreeMap::new();
+    // With own constants the columns differ, so that both effects can be meant.
     for entry in entries.filter(|entry| entry.constants.is_none()) {
         let Some(kind) = &entry.kind else { continue };
         let mut all: Vec<&str> = (entry.at.iter().flat_map(|at| &at.entries))
             .map(|place| place.text.as_str())
             .collect();
         let together = couples(entry);
+        // Places of a symmetric coupling are sorted, so that both orders compare equal.
         if together != Some(false) {
             all.sort_unstable();
         }
         let n_keys = if together.is_some() { 1 } else { all.len() };
+        // A coupling has one key, other effects have one for each place.
         for place in entry.at.iter().flat_map(|at| &at.entries).take(n_keys) {
             let key = if together.is_some() {
                 all.clone()
@@ -108,11 +121,13 @@ fn warn_of_twins<'a>(
             };
             let known = *seen.entry((&kind.text, key)).or_insert((entry, place));
             let (first, first_place) = known;
+            // The places of one effect are checked elsewhere.
             if std::ptr::eq(first, entry) {
                 continue;
             }
+            // An unnamed effect of another file was probably meant to be overridden.
             let remedy = if first.name.is_none() && first_place.span.file != place.span.file {
-                "to override the effect of the extended file, give it a `name` there and here the same one"
+                "to override the effect of the extended file, give both effects the same `name`"
             } else {
                 "delete one of them"
             };
@@ -129,21 +144,26 @@ fn warn_of_twins<'a>(
     }
 }
 
-/// A kind and whether it is sound.
+/// Kinds by name, each with whether it has no faults.
+/// The flag is false for kinds whose own entries have errors.
 type KindTable<'a> = BTreeMap<&'a str, (&'a EffectKindEntry, bool)>;
 
+/// The kinds of the library and of the file, each checked; faults and name clashes are reported.
 fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<'a> {
+    // Kinds of the program are valid.
     let mut kinds: KindTable<'a> = BTreeMap::new();
     for entry in library_entries() {
         if let Some(name) = &entry.name {
             kinds.insert(&name.text, (entry, true));
         }
     }
+    // Own kinds follow; a name that exists already is refused.
     for entry in own {
         let before = log.n_errors();
         let Some(name) = &entry.name else { continue };
         if let Some((first, _)) = kinds.get(name.text.as_str()) {
             let first_span = first.name.as_ref().map_or(name.span, |name| name.span);
+            // Kinds of the library have no place in the user's files.
             if first_span.file == usize::MAX {
                 log.push(
                     Diagnostic::error(
@@ -157,12 +177,15 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
             }
             continue;
         }
+        // Check the kind without a model; missing entries were reported by the reader.
         check_kind(entry, log);
+        // Faulty kinds stay in the table, so that their effects are not reported as unknown.
         let complete = (entry.mechanics.is_some()
             || entry.parameters.is_some() && entry.expression.is_some())
             && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
+    // A kind may refine one that is declared after it, so references are checked at the end.
     for refined in own.iter().filter_map(|entry| entry.refines.as_ref()) {
         if !kinds.contains_key(refined.text.as_str()) {
             log.push(
@@ -170,7 +193,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
                     refined.span,
                     format!("unknown kind of effect `{}`", refined.text),
                 )
-                .label("expected the simpler kind that this one holds as a special case")
+                .label("expected the simpler kind that is a special case of this one")
                 .help(suggest::advice(
                     &refined.text,
                     "kinds",
@@ -182,6 +205,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
     kinds
 }
 
+/// The diagnostic of an unknown kind of effect.
 fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
     let message = format!("unknown kind of effect `{}`", kind.text);
     Diagnostic::error(kind.span, message)
@@ -189,6 +213,8 @@ fn unknown_kind(kind: &SpannedName, kinds: &KindTable<'_>) -> Diagnostic {
         .help(suggest::advice(&kind.text, "kinds", kinds.keys().copied()))
 }
 
+/// Reads one effect; `None` after a fault, which is reported.
+/// The kind decides which places are allowed, which parameters exist, and what multiplies each of them.
 fn effect(
     entry: &EffectEntry,
     kinds: &KindTable<'_>,
@@ -204,16 +230,19 @@ fn effect(
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
+    // Places are looked up before the kind, so that unknown names are reported even for an unknown kind.
     let mut places: Vec<EffectPlace> = at
         .iter()
         .flat_map(|at| &at.entries)
         .filter_map(|name| find_place(name, allowed, symbols, scene, log))
         .collect();
+    // Without a kind nothing else can be checked.
     let kind_name = entry.kind.as_ref()?;
     let Some(&(kind, is_sound)) = known else {
         log.push(unknown_kind(kind_name, kinds));
         return None;
     };
+    // Names of parameters are compared with the symbols of the kind.
     check_parameter_names(entry, kind, log);
     let at = at?;
     if at.entries.is_empty() {
@@ -223,13 +252,16 @@ fn effect(
         );
         return None;
     }
+    // Faulty kinds and unknown places are reported already.
     if !is_sound || places.len() != at.entries.len() {
         return None;
     }
     let carries = common_load(kind, at, &places, symbols, scene.drives, log)?;
+    // The kind and its places fit; now its constants, and the factor or the bodies of each parameter.
     let before = log.n_errors();
     let mut constants = constants(entry, kind, kind_name, symbols, carries, log);
     check_values(entry, kind, kind_name, symbols, log);
+    // Expressions give one factor per parameter; mechanics check their places and give bodies.
     let shapes = match kind.mechanics {
         None => factors(kind, carries, &constants, log)?,
         Some(way) => {
@@ -246,18 +278,22 @@ fn effect(
             Vec::new()
         }
     };
+    // Default names of parameters end with the names of all places.
     let places_name = at
         .entries
         .iter()
         .map(|name| name.text.as_str())
         .collect::<Vec<_>>()
         .join("_");
+    // Mechanics may allow only some of their parameters at a place, such as those of a planar part.
     let own = kind.mechanics.zip(places.first());
     let own =
         own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
+    // One term per parameter of the kind, in the kind's order.
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
     for (i, (key, parameter)) in parameters.enumerate() {
+        // Parameters that do not exist at this place are skipped, or refused if the file names them.
         if let Some((way, those)) = &own
             && !those.contains(&key.name.as_str())
         {
@@ -268,6 +304,7 @@ fn effect(
         terms.push(EffectTerm {
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
+            // Terms of mechanics have the factor one.
             expression: shapes
                 .get(i)
                 .cloned()
@@ -276,15 +313,17 @@ fn effect(
     }
     let mut bodies = EffectBodies::default();
     if let Some(way) = kind.mechanics.map(Mechanics::entry) {
-        // A file of one's own may list them in another order.
+        // A kind of the user's file may list the parameters in another order.
         let listed = way.parameters().iter().map(|(symbol, _)| *symbol);
         terms.sort_by_key(|term| listed.clone().position(|symbol| symbol == term.symbol));
         bodies = way.bodies(&terms, &places, scene);
     }
+    // The second place of a kind with `other` is no place of action.
     let other = kind.other.and(places.get(1).copied());
     if other.is_some() {
         places.truncate(1);
     }
+    // A fault in any constant or term drops the effect.
     (log.n_errors() == before).then(|| ModelEffect {
         kind: kind_name.text.clone(),
         places,
@@ -296,7 +335,8 @@ fn effect(
     })
 }
 
-/// The parameter of one term of an effect: one that the file knows, or a new one.
+/// The parameter of one term of an effect: a parameter that the file declares, or a new one.
+/// `unit` is that of the parameter at these places, and `places_name` the end of its default name.
 fn term_parameter(
     entry: &EffectEntry,
     key: &TomlKey,
@@ -306,25 +346,30 @@ fn term_parameter(
     symbols: &mut SymbolTable,
     log: &mut DiagnosticLog,
 ) -> Option<ParameterIdx> {
+    // The entry of the file for this parameter, if there is one.
     let said = entry
         .parameters
         .iter()
         .flat_map(|table| &table.entries)
         .find(|(name, _)| name.name == key.name)
         .map(|(_, said)| said);
+    // Without a name in the file the parameter is called after its symbol and its places.
     let named = said.and_then(|said| said.name.as_ref());
     let name = named.map_or_else(
         || format!("{}_{places_name}", key.name),
         |name| name.text.clone(),
     );
+    // Messages point to the name of the parameter, or to the kind if the file gives none.
     let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
     let span = named.map_or(kind_span, |name| name.span);
     let nominal = said.and_then(|said| said.nominal);
+    // A name that is declared already shares that parameter; its unit must be the same.
     let shared = symbols.share_parameter(&name, Some(unit.dimension), span, nominal, log);
     let idx = match shared {
         ParameterLookup::Known(idx) => idx,
         ParameterLookup::Faulty => return None,
         ParameterLookup::New => {
+            // A new parameter starts with its nominal value, zero without one.
             let idx = ParameterIdx(symbols.parameters.len());
             let fine = symbols.declare_parameter(
                 DynamicParameter {
@@ -344,6 +389,7 @@ fn term_parameter(
             idx
         }
     };
+    // The sign is checked for shared parameters as well.
     let nominal_span = nominal.map_or(span, |number| number.span);
     warn_of_sign(
         &symbols.parameters[idx.0],
@@ -351,19 +397,22 @@ fn term_parameter(
         nominal_span,
         log,
     );
+    // An effect is a use of the parameter.
     if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
         meaning.used.set(true);
     }
     Some(idx)
 }
 
-/// Warns of a nominal value whose sign makes no physical sense.
+/// Warns of a nominal value whose sign contradicts the physics of the kind.
+/// `sign` is the one that the kind requires; without it nothing is reported.
 fn warn_of_sign(
     parameter: &DynamicParameter,
     sign: Option<Sign>,
     span: SourceSpan,
     log: &mut DiagnosticLog,
 ) {
+    // Zero is allowed for both signs: it means that no value is known.
     let value = parameter.nominal;
     let expected = match sign {
         Some(Sign::Positive) if value < 0.0 => "positive",
@@ -379,11 +428,13 @@ fn warn_of_sign(
             ),
         )
         .label(format!("expected a {expected} value"))
-        .help("check its sign, and whether the kind is the one that is meant"),
+        .help("check its sign, and whether this kind is intended"),
     );
 }
 
-/// The values of the kind's constants in this effect.
+/// The values of the kind's constants in this effect: its own values, else the defaults of the kind.
+///
+/// Unknown and missing constants are reported.
 fn constants(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
@@ -392,6 +443,7 @@ fn constants(
     carries: PlaceLoad,
     log: &mut DiagnosticLog,
 ) -> Vec<(String, ExactExpression)> {
+    // Unknown names first, then a value for each constant of the kind.
     let known = || kind.constants.iter().flat_map(|table| &table.entries);
     for (key, _) in entry.constants.iter().flat_map(|table| &table.entries) {
         if !known().any(|(name, _)| name.name == key.name) {
@@ -415,6 +467,7 @@ fn constants(
             .flat_map(|table| &table.entries)
             .find(|(name, _)| name.name == key.name)
             .map(|(_, formula)| formula);
+        // A constant without any value is reported with its note as the label.
         let Some(formula) = given.or(constant.value.as_ref()) else {
             log.push(
                 Diagnostic::error(
@@ -431,6 +484,7 @@ fn constants(
             );
             continue;
         };
+        // The unit of a constant depends on the load of the place.
         let dimension = unit_at(constant.unit.as_ref(), carries)
             .map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
@@ -446,7 +500,8 @@ fn constants(
     values
 }
 
-/// Reports values of the constants at which the kind's expression has no finite value, such as a Stribeck speed of 0.
+/// Reports values of constants at which the kind's expression is not finite, such as a Stribeck speed of 0.
+/// Kinds without an expression have nothing to evaluate.
 fn check_values(
     entry: &EffectEntry,
     kind: &EffectKindEntry,
@@ -454,6 +509,7 @@ fn check_values(
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) {
+    // The value of the effect, else the default of the kind.
     let given = |name: &str| {
         let own = entry
             .constants
@@ -469,7 +525,7 @@ fn check_values(
                 .and_then(|(_, constant)| constant.value.as_ref())
         })
     };
-    // Values that are no numbers themselves are reported where they stand.
+    // A constant without a finite value of its own is reported at that constant.
     let value = |name: &str| {
         finite::value(&given(name)?.ast, &|inner| symbols.scope.value(inner))
             .ok()
@@ -478,9 +534,11 @@ fn check_values(
     let Some(expression) = kind.expression.as_ref() else {
         return;
     };
+    // The innermost part of the expression that has no value.
     let Err(fault) = finite::value(&expression.ast, &value) else {
         return;
     };
+    // The mark is on the constant that causes the fault, unless its value is a default of the library.
     let named = kind
         .constants
         .iter()
@@ -496,6 +554,7 @@ fn check_values(
         || format!("`{}`", kind_name.text),
         |name| format!("`{name}`"),
     );
+    // The message names the constant if the faulty part is exactly that constant.
     let is_name = matches!(&fault.piece.kind, FormulaAstKind::Name(_));
     let message = match fault.cause {
         ValueFaultCause::Divides if is_name => format!("{what} must not be zero"),
@@ -517,7 +576,9 @@ fn check_values(
     );
 }
 
+/// Reports entries of `parameters` whose names the kind does not have.
 fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut DiagnosticLog) {
+    // All symbols of the kind, for the comparison and for the advice.
     let names: Vec<&str> = kind
         .parameters
         .iter()

@@ -1,4 +1,8 @@
-//! Frames, in any order in the file, as a tree whose parents come first; and the points on them.
+//! Frames, in any order in the file, as a tree in which parents come first; and the points on them.
+//!
+//! Each frame becomes a list of elementary rotations and translations from its parent. Denavit-Hartenberg rows are in
+//! the
+//! order of Khalil and Kleinfinger (modified) or in the standard order.
 
 use std::collections::BTreeMap;
 
@@ -18,18 +22,22 @@ use crate::suggest;
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
-/// The frames with their names.
+/// The frames, and their indices by name.
 pub(super) struct FrameTree {
+    /// The base first, and each parent before its children.
     pub(super) frames: Vec<ModelFrame>,
+    /// Index of each frame by its name.
     names: BTreeMap<String, FrameIdx>,
-    /// True if two frames have one name: the name that is missed may be meant for one of them.
+    /// True if two frames have the same name. An unknown name may then be meant for one of them and is not reported.
     any_twice: bool,
 }
 
+// Later stages look up parents and carriers of points by name.
 impl FrameTree {
-    /// Looks a frame up; an unknown name is reported.
+    /// The frame of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<FrameIdx> {
         let found = self.names.get(&name.text).copied();
+        // With duplicate names an unknown name may be a consequence.
         if found.is_none() && !self.any_twice && !log.is_full() {
             let removal = log.removal(&["frame"], &name.text);
             log.push(
@@ -44,7 +52,8 @@ impl FrameTree {
     }
 }
 
-/// Reads the frames and sorts them so that parents come first.
+/// Reads the frames, sorts them so that parents come first, and appends their places to `places.frames`.
+/// The base is always the frame with index 0.
 pub(super) fn frames(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -52,13 +61,15 @@ pub(super) fn frames(
     log: &mut DiagnosticLog,
 ) -> FrameTree {
     let entries: Vec<&FrameEntry> = model.frame.iter().flat_map(|list| &list.entries).collect();
+    // The first frame with a name keeps it; a second one is reported and left out.
     let mut by_name: BTreeMap<&str, usize> = BTreeMap::new();
     let mut any_twice = false;
     for (i, entry) in entries.iter().enumerate() {
+        // `base` is reserved; other names must be unique.
         let Some(name) = &entry.name else { continue };
         if name.text == "base" {
             log.push(
-                Diagnostic::error(name.span, "`base` is the frame that is there already")
+                Diagnostic::error(name.span, "the frame `base` exists already")
                     .label("expected another name"),
             );
         } else if let Some(first) = by_name.get(name.text.as_str()) {
@@ -72,6 +83,7 @@ pub(super) fn frames(
             by_name.insert(&name.text, i);
         }
     }
+    // The tree starts with the base.
     let mut tree = FrameTree {
         frames: vec![ModelFrame {
             name: "base".to_owned(),
@@ -83,6 +95,7 @@ pub(super) fn frames(
         any_twice,
     };
     places.frames.push(None);
+    // Parents are already in the tree here; an unknown parent was reported and is replaced by the base.
     let order = parents_first(&entries, &by_name, any_twice, log);
     for i in order {
         let entry = entries[i];
@@ -92,6 +105,7 @@ pub(super) fn frames(
             .as_ref()
             .and_then(|on| tree.names.get(&on.text).copied())
             .unwrap_or(FrameIdx(0));
+        // Steps from the parent, as elementary rotations and translations.
         let (steps, convention) = placement(entry, symbols, log);
         tree.names
             .insert(name.text.clone(), FrameIdx(tree.frames.len()));
@@ -106,7 +120,8 @@ pub(super) fn frames(
     tree
 }
 
-/// `S1` is defined twice.
+/// The diagnostic of a name that is defined twice.
+/// `what` is the sort of thing, and `first` the place of the first definition.
 pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) -> Diagnostic {
     Diagnostic::error(
         name.span,
@@ -117,21 +132,29 @@ pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) 
     .help("rename one of the two, or delete it")
 }
 
-/// Indices of the entries, parents first; unknown parents and cycles are reported and hung on the base.
+/// Indices of the entries, parents first; unknown parents and cycles are reported, and such frames are fixed to the
+/// base.
+///
+/// Depth-first search from each frame towards the base.
 fn parents_first(
     entries: &[&FrameEntry],
     by_name: &BTreeMap<&str, usize>,
     any_twice: bool,
     log: &mut DiagnosticLog,
 ) -> Vec<usize> {
+    /// The state of a frame during the search.
     #[derive(Clone, Copy, PartialEq)]
     enum FrameMark {
+        /// Not visited yet.
         New,
+        /// On the path that is followed now.
         OnPath,
+        /// In the order already.
         Done,
     }
     let mut marks = vec![FrameMark::New; entries.len()];
     let mut order = Vec::new();
+    // Walk from each frame to its parent until the base, a finished frame, or a fault ends the path.
     for start in by_name_order(entries, by_name) {
         let mut path = Vec::new();
         let mut at = start;
@@ -139,6 +162,7 @@ fn parents_first(
             if marks[at] == FrameMark::Done {
                 break;
             }
+            // The path has reached one of its own frames.
             if marks[at] == FrameMark::OnPath {
                 report_cycle(entries, &path, at, log);
                 break;
@@ -149,6 +173,7 @@ fn parents_first(
             if on.text == "base" {
                 break;
             }
+            // An unknown parent is reported here only, where the names of all frames are known.
             let Some(&parent) = by_name.get(on.text.as_str()) else {
                 if !any_twice && !log.is_full() {
                     let known = by_name.keys().copied().chain(["base"]);
@@ -165,6 +190,7 @@ fn parents_first(
             };
             at = parent;
         }
+        // The path leads from a frame to its ancestors, so its reverse has parents first.
         for done in path.into_iter().rev() {
             marks[done] = FrameMark::Done;
             order.push(done);
@@ -173,7 +199,7 @@ fn parents_first(
     order
 }
 
-/// The entries that own their names, in the order of the file.
+/// Indices of the entries that keep their names, in the order of the file.
 fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Vec<usize> {
     (0..entries.len())
         .filter(|i| {
@@ -185,8 +211,10 @@ fn by_name_order(entries: &[&FrameEntry], by_name: &BTreeMap<&str, usize>) -> Ve
         .collect()
 }
 
+/// Reports frames whose parents form a cycle; `path` ends before the frame `at` is reached again.
 fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut DiagnosticLog) {
     let from = path.iter().position(|&one| one == at).unwrap_or(0);
+    // The cycle starts at the first occurrence of the frame on the path.
     let names: Vec<&str> = path[from..]
         .iter()
         .chain([&at])
@@ -198,6 +226,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
         .as_ref()
         .map_or(entries[at].span, |on| on.span);
     log.push(
+        // Long cycles are described by their number of frames.
         Diagnostic::error(span, "these frames hang on one another in a circle")
             .label(if names.len() > 12 {
                 format!("a circle of {} frames", names.len() - 1)
@@ -208,13 +237,15 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
     );
 }
 
-/// The steps of a frame from its parent.
+/// The steps of a frame from its parent, and how the file describes them.
+/// Exactly one of the three descriptions must be given; a joint without a transform is allowed.
 fn placement(
     entry: &FrameEntry,
     symbols: &SymbolTable,
     log: &mut DiagnosticLog,
 ) -> (Vec<FrameStep>, FrameConvention) {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
+    // Count the descriptions; `transform` and `joint` belong together.
     let n_ways = usize::from(entry.modified_dh.is_some())
         + usize::from(entry.standard_dh.is_some())
         + usize::from(entry.transform.is_some() || entry.joint.is_some());
@@ -232,6 +263,7 @@ fn placement(
             .help("for example `modified_dh = { a = \"d1\", theta = \"theta1\" }`"),
         );
     }
+    // Khalil and Kleinfinger: alpha and a belong to the parent's x axis.
     if let Some(dh) = &entry.modified_dh {
         let row = dh_row(dh, symbols, log);
         let steps = vec![
@@ -242,6 +274,7 @@ fn placement(
         ];
         (without_zeros(steps), FrameConvention::ModifiedDh(row.texts))
     } else if let Some(dh) = &entry.standard_dh {
+        // Denavit and Hartenberg: theta and d belong to the parent's z axis.
         let row = dh_row(dh, symbols, log);
         let steps = vec![
             FrameStep::Rotate(FrameAxis::Z, row.theta),
@@ -253,6 +286,7 @@ fn placement(
     } else {
         let mut steps = Vec::new();
         let mut text = Vec::new();
+        // A transform comes before its joint.
         if let Some(transform) = &entry.transform {
             transform_steps(transform, symbols, &mut steps, &mut text, log);
         }
@@ -266,15 +300,23 @@ fn placement(
     }
 }
 
+/// A Denavit-Hartenberg row.
 struct DhRow {
+    /// Length along x, m.
     a: ExactLength,
+    /// Angle about x, rad.
     alpha: ExactAngle,
+    /// Length along z, m.
     d: ExactLength,
+    /// Angle about z, rad.
     theta: ExactAngle,
+    /// The texts of `a`, `alpha`, `d` and `theta`, for print.
     texts: [String; 4],
 }
 
+/// Resolves a Denavit-Hartenberg row; omitted entries are zero.
 fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow {
+    // Omitted entries are printed as zero.
     let text = |formula: &Option<SourceFormula>| {
         formula
             .as_ref()
@@ -289,6 +331,7 @@ fn dh_row(dh: &DhEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> DhRow
     }
 }
 
+/// A length with its coordinates; zero if absent or faulty. `what` names it in messages.
 pub(super) fn length_or_zero(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -303,6 +346,7 @@ pub(super) fn length_or_zero(
         })
 }
 
+/// An angle with its coordinates; zero if absent or faulty.
 pub(super) fn angle_or_zero(
     formula: Option<&SourceFormula>,
     symbols: &SymbolTable,
@@ -313,6 +357,8 @@ pub(super) fn angle_or_zero(
         .unwrap_or_else(ExactAngle::zero)
 }
 
+/// Appends the steps of a fixed transform: translations, then rotations about z, y and x.
+/// `text` gets its description. Coordinates in a transform are reported, because it is fixed.
 fn transform_steps(
     transform: &TransformEntry,
     symbols: &SymbolTable,
@@ -320,11 +366,13 @@ fn transform_steps(
     text: &mut Vec<String>,
     log: &mut DiagnosticLog,
 ) {
+    // An entry of a vector, if the vector has it.
     let entry = |vector: &Option<crate::values::FormulaVector>, i: usize| {
         vector
             .as_ref()
             .and_then(|vector| vector.entries.get(i)?.clone())
     };
+    // Vectors are printed with three entries.
     let shown = |vector: &Option<crate::values::FormulaVector>| {
         (0..3)
             .map(|i| entry(vector, i).map_or_else(|| "0".to_owned(), |formula| formula.text))
@@ -337,6 +385,7 @@ fn transform_steps(
     if transform.rpy.is_some() {
         text.push(format!("rpy({})", shown(&transform.rpy)));
     }
+    // A coordinate here would make a joint, which belongs into `joint`.
     for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z]
         .into_iter()
         .enumerate()
@@ -348,6 +397,7 @@ fn transform_steps(
         }
         steps.push(FrameStep::Translate(axis, along));
     }
+    // Rz(yaw) Ry(pitch) Rx(roll): the fixed-axis angles in reverse order.
     for (i, axis) in [(2, FrameAxis::Z), (1, FrameAxis::Y), (0, FrameAxis::X)] {
         let about = entry(&transform.rpy, i);
         let about = angle_or_zero(about.as_ref(), symbols, log);
@@ -362,6 +412,7 @@ fn transform_steps(
     }
 }
 
+/// The diagnostic of a coordinate in a fixed transform; `motion` is the kind of joint to use instead.
 fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
     Diagnostic::error(
         formula.ast.span,
@@ -373,7 +424,9 @@ fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
     ))
 }
 
+/// The steps without rotations and translations by zero.
 fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
+    // Steps by zero would only lengthen all derived expressions.
     steps
         .into_iter()
         .filter(|step| match step {
@@ -384,14 +437,16 @@ fn without_zeros(steps: Vec<FrameStep>) -> Vec<FrameStep> {
         .collect()
 }
 
-/// The points with their names.
+/// The points, and their indices by name.
 pub(crate) struct PointTable {
+    /// The points in the order of the file.
     pub(crate) points: Vec<FramePoint>,
+    /// Index of each point by its name.
     names: BTreeMap<String, PointIdx>,
 }
 
 impl PointTable {
-    /// Looks a point up; an unknown name is reported.
+    /// The point of a name; an unknown name is reported.
     pub(super) fn find(&self, name: &SpannedName, log: &mut DiagnosticLog) -> Option<PointIdx> {
         let found = self.get(&name.text);
         if found.is_none() && !log.is_full() {
@@ -407,18 +462,18 @@ impl PointTable {
         found
     }
 
-    /// The point of a name.
+    /// The point of a name, if there is one.
     pub(super) fn get(&self, name: &str) -> Option<PointIdx> {
         self.names.get(name).copied()
     }
 
-    /// The names of all points.
+    /// The names of all points, in alphabetical order.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.names.keys().map(String::as_str)
     }
 }
 
-/// Reads the points.
+/// Reads the points and appends their places to `places.points`.
 pub(super) fn points(
     model: &ModelEntry,
     scope: &FormulaScope,
@@ -430,6 +485,7 @@ pub(super) fn points(
         points: Vec::new(),
         names: BTreeMap::new(),
     };
+    // A point with an unknown frame is kept on the base, so that its name stays known.
     for entry in model.point.iter().flat_map(|list| &list.entries) {
         let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
         let at = entry.at.as_ref().map_or_else(
@@ -444,6 +500,7 @@ pub(super) fn points(
             },
         );
         let Some(name) = &entry.name else { continue };
+        // Points with the same name are reported; the first one stays.
         if let Some(first) = points.names.get(&name.text) {
             log.push(duplicate_name("point", name, places.points[first.0]));
             continue;

@@ -1,7 +1,7 @@
-//! From the tables of a file to the mechanism that they mean.
+//! From the tables of a file to the mechanism that they describe.
 //!
-//! Every stage reports all faults that it finds and goes on with what is sound; a name whose definition is faulty
-//! counts as known, so that one fault is reported once.
+//! Every stage reports all faults that it finds and continues with the parts that have none. A name with a faulty
+//! definition counts as known, so that one fault is reported once.
 
 mod actuation;
 mod bodies;
@@ -24,20 +24,28 @@ use crate::mechanism::{Mechanism, RecordingColumns};
 use crate::pose;
 use crate::schema::{EffectKindEntry, ModelEntry};
 
-/// The places of what a mechanism holds, by index, for findings about its pose.
+/// The places in the file of the parts of a mechanism, by index, for findings about its pose.
 #[derive(Debug, Default)]
 pub(crate) struct MechanismSpans {
+    /// The complete file.
     pub(crate) whole: Option<SourceSpan>,
+    /// Frames; `None` for the base.
     pub(crate) frames: Vec<Option<SourceSpan>>,
+    /// Names of points.
     pub(crate) points: Vec<SourceSpan>,
+    /// The pairs of points of loops.
     pub(crate) loops: Vec<SourceSpan>,
+    /// Drives, or the coordinates of rows without a drive.
     pub(crate) drives: Vec<SourceSpan>,
+    /// Names of coordinates.
     pub(crate) coordinates: Vec<SourceSpan>,
 }
 
 /// Builds the mechanism, if there are no errors, and the kinds of effects that its file may use.
 ///
-/// `libraries` are kinds of libraries of its own.
+/// `libraries` are kinds of effects from libraries of the user.
+///
+/// The mechanism is `None` after any error, each of which is in the log.
 pub(crate) fn build(
     model: &ModelEntry,
     libraries: &[EffectKindEntry],
@@ -47,10 +55,12 @@ pub(crate) fn build(
         whole: Some(model.span),
         ..MechanismSpans::default()
     };
+    // Names first: all later stages resolve expressions with them.
     let mut symbols = symbols::declare(model, &mut places, log);
     let gravity = symbols::gravity(model, &symbols.scope, log);
     let n_errors = log.n_errors();
     let tree = frames::frames(model, &symbols, &mut places, log);
+    // A faulty frame may be the one that would use a coordinate.
     if log.n_errors() == n_errors {
         symbols::check_coordinates_move(model, &symbols, &places, log);
     }
@@ -61,6 +71,7 @@ pub(crate) fn build(
     let loops = actuation::loops(model, &points, &mut places, log);
     free::check_loops(&tree, &loops, &points, &places, log);
     let drives = actuation::drives(model, &symbols, &tree, &points, &mut places, log);
+    // Effects come after drives, points and parts, on which they act.
     let own_kinds = model.effect_kind.iter().flat_map(|list| &list.entries);
     let own_kinds: Vec<&EffectKindEntry> = libraries.iter().chain(own_kinds).collect();
     let scene = EffectTargets {
@@ -70,6 +81,7 @@ pub(crate) fn build(
         lumped_masses: &lumped_masses,
     };
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
+    // Effects may tilt gravity or delay the measured forces.
     let (gravity, force_delay) =
         mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
@@ -84,6 +96,7 @@ pub(crate) fn build(
     let columns = actuation::recording(model, &symbols, &drives, log);
     let torque = actuation::torque(model, &drives, log);
     actuation::check_place_names(model, log);
+    // With errors, unused names are often a consequence.
     if log.n_errors() == 0 {
         symbols::warn_of_unused(&symbols, log);
     }
@@ -118,6 +131,7 @@ pub(crate) fn build(
         recording: RecordingColumns { columns, torque },
         is_at_values: false,
     };
+    // These checks need the complete mechanism at its nominal values.
     bodies::warn_of_negative(model, &mechanism, log);
     pose::check_pose(&mut mechanism, &places, log);
     ((log.n_errors() == 0).then_some(mechanism), kinds)

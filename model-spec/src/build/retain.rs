@@ -1,4 +1,6 @@
 //! The products of parameters that should stay in the base parameters.
+//!
+//! The list `retain` goes in; powers of parameters come out, one list per product.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +11,9 @@ use crate::formula::{FormulaAst, FormulaAstKind};
 use crate::schema::ModelEntry;
 use crate::scope::SymbolSort;
 
-/// Reads the products of parameters to retain.
+/// Reads the products to retain: for each, its parameters with positive exponents, in the order of the file.
+///
+/// Their order is that of preference: the most wanted product comes first.
 pub(super) fn retain(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -25,6 +29,9 @@ pub(super) fn retain(
     products
 }
 
+/// Adds the powers of a product to `powers`, all multiplied by `exponent`; false after a fault.
+///
+/// Only names of parameters, products of them, and positive powers are allowed.
 fn product(
     ast: &FormulaAst,
     exponent: u32,
@@ -33,8 +40,9 @@ fn product(
     log: &mut DiagnosticLog,
 ) -> bool {
     match &ast.kind {
+        // A name must be that of a parameter.
         FormulaAstKind::Name(name) => {
-            // Naming a parameter here uses nothing: it only orders what the mechanism holds.
+            // An entry of `retain` does not count as a use of the parameter, so the mark is restored.
             let was_used = symbols
                 .scope
                 .get(name)
@@ -52,6 +60,7 @@ fn product(
             }
             true
         }
+        // All factors are read, so that each fault is reported.
         FormulaAstKind::Product(factors) => {
             let mut fine = true;
             for factor in factors {
@@ -59,6 +68,7 @@ fn product(
             }
             fine
         }
+        // Nested powers multiply their exponents.
         FormulaAstKind::Power(base, power) if *power > 0 => product(
             base,
             exponent.saturating_mul(power.unsigned_abs()),

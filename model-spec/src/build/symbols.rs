@@ -1,4 +1,6 @@
 //! Constants, parameters and coordinates: the names that expressions may use.
+//!
+//! They are declared before anything else is read, so that every later stage can resolve expressions.
 
 use std::cell::Cell;
 
@@ -15,28 +17,33 @@ use crate::values::FormulaVector;
 
 /// Most coordinates of a mechanism.
 const MOST_COORDINATES: usize = 100;
-/// Further ones that are looked at although the file has too many.
+/// Most coordinates that are declared although the file has too many, so that uses of them are not reported as
+/// unknown.
 const DECLARED_AT_MOST: usize = 1000;
 
-/// What the names of a file stand for.
+/// The quantities that the names of a file stand for.
 pub(crate) struct SymbolTable {
+    /// All names with sort, dimension and whether they are used.
     pub(crate) scope: FormulaScope,
+    /// Constants by index.
     pub(crate) constants: Vec<ModelConstant>,
+    /// Parameters by index; effects add further ones.
     pub(super) parameters: Vec<DynamicParameter>,
-    /// Where each parameter got its nominal value; those of effects and shorthands may get one later.
+    /// Where each parameter gets its nominal value. Parameters of effects and shorthands may get one later.
     pub(super) nominal_given: Vec<Option<SourceSpan>>,
+    /// Coordinates by index.
     pub(super) coordinates: Vec<JointCoordinate>,
-    /// Coordinates that no frame mentions.
+    /// Coordinates that no frame uses.
     still: Vec<CoordinateIdx>,
 }
 
-/// What became of a parameter's name that may be declared already.
+/// The result of looking up a parameter's name that may be declared already.
 pub(super) enum ParameterLookup {
-    /// No one has declared it yet.
+    /// The name is not declared yet.
     New,
-    /// It is this parameter.
+    /// The name is that of this parameter.
     Known(ParameterIdx),
-    /// It is something else, which is reported.
+    /// The name is that of another quantity, or the parameter does not fit; this is reported.
     Faulty,
 }
 
@@ -53,10 +60,12 @@ pub(super) const LINEAR: [(&str, UnitDimension); 10] = [
     ("MZ", UnitDimension::FIRST_MOMENT),
     ("M", UnitDimension::MASS),
 ];
-/// Those of a body in the x-y plane.
+/// The linear parameters of a body in the x-y plane.
 const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 
-/// Declares all names of a file.
+/// Declares all names of a file: constants, parameters, shorthands of parts, and coordinates.
+///
+/// The places of coordinates are appended to `places.coordinates`.
 pub(super) fn declare(
     model: &ModelEntry,
     places: &mut MechanismSpans,
@@ -70,9 +79,11 @@ pub(super) fn declare(
         coordinates: Vec::new(),
         still: Vec::new(),
     };
+    // Constants, with the dimension of their unit; one without a value counts as 1, because the fault is reported.
     for (key, entry) in model.constants.iter().flat_map(|table| &table.entries) {
         let symbol = ModelSymbol::Constant(ConstantIdx(symbols.constants.len()));
         let unit = entry.unit.as_ref();
+        // A faulty unit fits any other, so that it is reported once only.
         let unit_text = unit.map_or("?", |unit| unit.text.as_str());
         let dimension = unit.map(|unit| unit.dimension);
         let meaning = SymbolMeaning {
@@ -95,6 +106,7 @@ pub(super) fn declare(
             });
         }
     }
+    // Parameters, whose nominal value is zero if the file gives none.
     for (key, entry) in model.parameters.iter().flat_map(|table| &table.entries) {
         let unit = entry.unit.as_ref();
         symbols.declare_parameter(
@@ -110,14 +122,15 @@ pub(super) fn declare(
             log,
         );
     }
+    // Shorthands declare parameters of parts; coordinates need the frames.
     declare_shorthands(model, &mut symbols, log);
     declare_coordinates(model, &mut symbols, places, log);
     declare_faulty(model, &mut symbols, log);
     symbols
 }
 
-/// Declares the names whose entries could not be read, with a meaning that fits anything:
-/// what is wrong with them is reported, and they are not unknown.
+/// Declares the names whose entries could not be read. They fit any sort of use, so that only their own fault is
+/// reported.
 fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     let constants = model.constants.iter().flat_map(|table| &table.faulty);
     let parameters = model.parameters.iter().flat_map(|table| &table.faulty);
@@ -126,6 +139,7 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut Diagn
         .map(|key| (key, SymbolSort::Constant))
         .chain(parameters.map(|key| (key, SymbolSort::Parameter)))
         .chain(coordinates.map(|key| (key, SymbolSort::Coordinate)));
+    // A dimension of `None` fits any other, so that uses cause no further findings.
     for (key, sort) in all {
         let meaning = SymbolMeaning {
             sort,
@@ -140,7 +154,9 @@ fn declare_faulty(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut Diagn
     }
 }
 
-/// Reports coordinates that no joint moves by, and a mechanism without any.
+/// Reports coordinates that no joint uses, and a mechanism without any.
+///
+/// Nothing is reported if a frame is faulty, because it may be the one that uses the coordinate.
 pub(super) fn check_coordinates_move(
     model: &ModelEntry,
     symbols: &SymbolTable,
@@ -148,18 +164,20 @@ pub(super) fn check_coordinates_move(
     log: &mut DiagnosticLog,
 ) {
     if log.syntax_broken || model.frame.as_ref().is_some_and(|list| list.faulty) {
-        return; // A faulty frame may be the one that moves.
+        return; // A faulty frame may be the one that uses them.
     }
+    // An unused coordinate would have a zero column in every Jacobian.
     for &CoordinateIdx(idx) in &symbols.still {
         log.push(
             Diagnostic::error(
                 places.coordinates[idx],
-                format!("no joint moves by `{}`", symbols.coordinates[idx].name),
+                format!("no joint uses `{}`", symbols.coordinates[idx].name),
             )
             .label("expected in `theta` or `d` of a frame, or in its `joint`")
             .help("use the coordinate in a frame, or delete it"),
         );
     }
+    // A mechanism whose coordinates are all faulty has reported that already.
     let faulty = model
         .coordinates
         .as_ref()
@@ -174,7 +192,9 @@ pub(super) fn check_coordinates_move(
 }
 
 impl SymbolTable {
-    /// Adds a parameter; false if its name is taken.
+    /// Adds a parameter; false if its name is taken, which is reported.
+    ///
+    /// `nominal_given` is the place of its nominal value, if the file gives one.
     pub(super) fn declare_parameter(
         &mut self,
         parameter: DynamicParameter,
@@ -199,7 +219,10 @@ impl SymbolTable {
         fine
     }
 
-    /// The parameter of a name that a second place shares; its dimension must agree, and its nominal value if both give one.
+    /// Looks up a parameter that a second place may share. Its dimension must agree, and its nominal value if both
+    /// give one.
+    ///
+    /// `span` is the second use, and `nominal` the value that it gives.
     pub(super) fn share_parameter(
         &mut self,
         name: &str,
@@ -208,9 +231,11 @@ impl SymbolTable {
         nominal: Option<crate::values::SpannedNumber>,
         log: &mut DiagnosticLog,
     ) -> ParameterLookup {
+        // A new name is declared by the caller.
         let Some(meaning) = self.scope.get(name) else {
             return ParameterLookup::New;
         };
+        // The name may belong to a constant or a coordinate.
         let ExactExpression::Symbol(ModelSymbol::Parameter(idx)) = meaning.exact else {
             let diagnostic = Diagnostic::error(span, format!("`{name}` is not a parameter"))
                 .label("expected the name of a parameter, or a new name");
@@ -220,6 +245,7 @@ impl SymbolTable {
             });
             return ParameterLookup::Faulty;
         };
+        // Both uses must have the same dimension.
         if let (Some(wanted), Some(found)) = (dimension, meaning.dimension)
             && wanted != found
         {
@@ -235,6 +261,7 @@ impl SymbolTable {
             });
             return ParameterLookup::Faulty;
         }
+        // At most one nominal value may be given, or the same one twice.
         if let Some(nominal) = nominal {
             match self.nominal_given[idx.0] {
                 #[allow(clippy::float_cmp)] // The same number twice is the same text.
@@ -260,7 +287,9 @@ impl SymbolTable {
     }
 }
 
-/// Declares the parameters that `linear = { all = "1" }` stands for.
+/// Declares the parameters of shorthands such as `linear = { all = "1" }`.
+///
+/// Parts with the same suffix share these parameters.
 fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut DiagnosticLog) {
     for part in model.part.iter().flat_map(|list| &list.entries) {
         let Some(linear) = &part.linear else {
@@ -269,11 +298,13 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
         let Some((suffix, members)) = shorthand(linear) else {
             continue;
         };
+        // All ten symbols are visited, so that nominal values without a parameter are reported.
         for (symbol, dimension) in LINEAR {
             let nominal = linear
                 .nominal
                 .as_ref()
                 .and_then(|nominal| nominal_of(nominal, symbol));
+            // An explicit entry replaces the parameter, which then has no nominal value.
             let own = explicit_entry(linear, symbol);
             if !members.contains(&symbol) || own.is_some() {
                 if let Some(nominal) = nominal {
@@ -294,6 +325,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
                 }
                 continue;
             }
+            // A parameter with this name may exist already, from another part or from the table of parameters.
             let name = format!("{symbol}{}", suffix.text);
             let shared = symbols.share_parameter(&name, Some(dimension), suffix.span, nominal, log);
             if matches!(shared, ParameterLookup::New) {
@@ -314,7 +346,9 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
     }
 }
 
-/// The suffix of a shorthand and the symbols that it stands for.
+/// The suffix of a shorthand and the symbols of its parameters; `None` without a shorthand.
+///
+/// The suffix ends the names of all of them, such as `1` in `ZZ1`.
 pub(super) fn shorthand(
     linear: &LinearEntry,
 ) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
@@ -326,7 +360,7 @@ pub(super) fn shorthand(
     }
 }
 
-/// The entry that a body gives for one of the linear parameters.
+/// The explicit expression of a part for one of the linear parameters.
 pub(super) fn explicit_entry<'a>(
     linear: &'a LinearEntry,
     symbol: &str,
@@ -345,6 +379,7 @@ pub(super) fn explicit_entry<'a>(
     }
 }
 
+/// The nominal value that a part gives for one of the linear parameters.
 fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::values::SpannedNumber> {
     match symbol {
         "XX" => nominal.xx,
@@ -360,13 +395,16 @@ fn nominal_of(nominal: &LinearNominalEntry, symbol: &str) -> Option<crate::value
     }
 }
 
-/// Declares the coordinates; whether one is an angle or a length follows from the frames.
+/// Declares the coordinates; their use in the frames decides whether each is an angle or a length.
+///
+/// The places of coordinates are appended to `places.coordinates`.
 fn declare_coordinates(
     model: &ModelEntry,
     symbols: &mut SymbolTable,
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) {
+    // Expressions of all frames, sorted by the quantity that they describe.
     let FrameFormulas {
         angles,
         lengths,
@@ -380,11 +418,12 @@ fn declare_coordinates(
         log.push(
             Diagnostic::error(key.span, "there are too many coordinates")
                 .label(format!("at most {MOST_COORDINATES}"))
-                .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint stands still"),
+                .help("fix joints that the recordings do not move, such as those of fingers: a frame without a joint is fixed"),
         );
     }
-    // Some of those above are known as well, so that few other places of the file have a fault by them.
+    // Coordinates beyond the limit are declared too, so that their uses cause no further findings.
     for (key, entry) in entries.iter().take(DECLARED_AT_MOST) {
+        // The first use as an angle, as a length, and in a quaternion.
         let turns = angles.iter().find_map(|ast| find_name(ast, &key.name));
         let slides = lengths.iter().find_map(|ast| find_name(ast, &key.name));
         let of_quaternion = quaternions
@@ -401,7 +440,9 @@ fn declare_coordinates(
                 .help("declare a coordinate for each joint"),
             );
         }
+        // A coordinate with conflicting uses, or with none, has no dimension and counts as revolute.
         let of_quaternion = of_quaternion.map(|(_, motion)| motion);
+        // Exactly one of the uses decides the kind of motion.
         let motion = match (turns, slides) {
             (Some(turns), Some(slides)) => {
                 log.push(
@@ -424,8 +465,9 @@ fn declare_coordinates(
                 None
             }
         };
-        // Without values a quaternion turns nothing.
+        // Without nominal values a quaternion is the identity: its scalar part is one.
         let at_rest = f64::from(u8::from(motion == Some(CoordinateMotion::QuaternionScalar)));
+        // The dimension is unknown if the kind of motion is; then it fits any use.
         let dimension = motion.map(CoordinateMotion::dimension);
         let motion = motion.unwrap_or(CoordinateMotion::Revolute);
         let symbol = ModelSymbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
@@ -436,6 +478,7 @@ fn declare_coordinates(
             motion.unit(),
             Some(key.span),
         );
+        // A name that is taken is reported by the scope.
         if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
             symbols.coordinates.push(JointCoordinate {
@@ -445,24 +488,32 @@ fn declare_coordinates(
                 nominal: entry.nominal.map_or(at_rest, |number| number.value),
             });
         } else {
+            // A duplicate was not added, so it must not be reported as unused.
             let n_coordinates = symbols.coordinates.len();
             symbols.still.retain(|idx| idx.0 < n_coordinates);
         }
     }
 }
 
-/// The expressions of all frames by what they are.
+/// The expressions of all frames, by the quantity that they describe.
 struct FrameFormulas<'a> {
+    /// Angles of frames and joints.
     angles: Vec<&'a FormulaAst>,
+    /// Lengths of frames and joints.
     lengths: Vec<&'a FormulaAst>,
+    /// Components of quaternions, each with its kind.
     quaternions: Vec<(&'a FormulaAst, CoordinateMotion)>,
 }
 
+/// Collects the expressions of all frames and joints.
+///
+/// Transforms are not included, because they cannot contain coordinates.
 fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
     let mut angles: Vec<&FormulaAst> = Vec::new();
     let mut lengths: Vec<&FormulaAst> = Vec::new();
     let mut quaternions = Vec::new();
     for frame in model.frame.iter().flat_map(|list| &list.entries) {
+        // Both conventions of Denavit and Hartenberg have the same entries.
         for dh in frame.modified_dh.iter().chain(&frame.standard_dh) {
             angles.extend(dh.alpha.iter().chain(&dh.theta).map(|formula| &formula.ast));
             lengths.extend(dh.a.iter().chain(&dh.d).map(|formula| &formula.ast));
@@ -470,6 +521,7 @@ fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
         if let Some(joint) = &frame.joint {
             angles.extend(joint.revolute.iter().map(|formula| &formula.ast));
             lengths.extend(joint.prismatic.iter().map(|formula| &formula.ast));
+            // Joints with several coordinates state the kind of each of them.
             for (formula, motion) in crate::build::joints::coordinates(joint) {
                 match motion {
                     CoordinateMotion::Revolute => angles.push(&formula.ast),
@@ -488,9 +540,10 @@ fn joint_formulas(model: &ModelEntry) -> FrameFormulas<'_> {
     }
 }
 
-/// The place of a name in an expression.
+/// The place of a name in an expression, if the expression contains it.
 fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     match &ast.kind {
+        // Leaves first, then the operands in the order of the text.
         FormulaAstKind::Name(found) => (found == name).then_some(ast.span),
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             inner.iter().find_map(|one| find_name(one, name))
@@ -505,7 +558,7 @@ fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
     }
 }
 
-/// Gravity in the base frame; zero if the file gives none.
+/// Gravity in the base frame, m/s^2; zero if the file gives none.
 pub(super) fn gravity(
     model: &ModelEntry,
     scope: &FormulaScope,
@@ -528,7 +581,9 @@ pub(super) fn gravity(
     )
 }
 
-/// The entries of a vector; zero where one is absent or faulty.
+/// The entries of a vector; zero for each that is absent or faulty.
+///
+/// `wanted` is what each entry must be, with its name in messages.
 pub(super) fn vector(
     vector: &FormulaVector,
     scope: &FormulaScope,
@@ -545,12 +600,15 @@ pub(super) fn vector(
     })
 }
 
-/// Warns of constants and parameters that nothing uses.
+/// Warns of constants and parameters that no expression uses.
+///
+/// Parameters of effects and shorthands count as used by these.
 pub(super) fn warn_of_unused(symbols: &SymbolTable, log: &mut DiagnosticLog) {
     for (name, meaning) in symbols.scope.iter() {
         let Some(declared) = meaning.declared.filter(|_| !meaning.used.get()) else {
             continue;
         };
+        // Unused coordinates are errors, and names of places are declared by the program.
         let what = match meaning.sort {
             SymbolSort::Constant => "constant",
             SymbolSort::Parameter => "parameter",

@@ -1,4 +1,6 @@
-//! Differences of one part from what the model file says of it.
+//! Differences of one part from its entry in the model file.
+//!
+//! The differences are a further part on the same frame, linear in its ten parameters.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -24,11 +26,12 @@ const DIFFERENCES: MechanicsSymbols = &[
     ("dJzz", UnitDimension::INERTIA),
 ];
 
+/// The entry of [`crate::Mechanics::Part`].
 pub(crate) struct PartMechanics;
 
 impl MechanicsEntry for PartMechanics {
     fn description(&self) -> &'static str {
-        "mass, first moments and inertia of this part alone"
+        "mass, first moments and inertia of this part only"
     }
 
     fn introduction(&self) -> &'static str {
@@ -50,9 +53,11 @@ impl MechanicsEntry for PartMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // Only parts reach this check; other places are refused before.
         let EffectPlace::Part(part) = place else {
             return;
         };
+        // Names of parts may repeat; then a name does not state which part is meant.
         if !is_only_one(scene.parts, part.0) {
             log.push(
                 Diagnostic::error(
@@ -63,6 +68,7 @@ impl MechanicsEntry for PartMechanics {
                 .help("give the parts names of their own: `name = \"...\"` in `[[part]]`"),
             );
         } else if components(&scene.parts[part.0].inertial).is_empty() {
+            // Without mass and inertia all differences would be exactly zero.
             log.push(
                 Diagnostic::error(name.span, "this part has neither mass nor inertia")
                     .label("there is nothing that could differ"),
@@ -70,6 +76,7 @@ impl MechanicsEntry for PartMechanics {
         }
     }
 
+    // A quantity that is exactly zero in the file stays zero, such as those of a planar body.
     fn parameters_at(&self, place: EffectPlace, parts: &[ModelPart]) -> Option<Vec<&'static str>> {
         let EffectPlace::Part(part) = place else {
             return None;
@@ -84,23 +91,25 @@ impl MechanicsEntry for PartMechanics {
         those: &[&str],
         log: &mut DiagnosticLog,
     ) {
+        // Only parameters that the effect names are reported; the others are left out.
         let named = entry.parameters.iter().flat_map(|table| &table.entries);
         if let Some((key, _)) = named.into_iter().find(|(key, _)| key.name == symbol) {
             log.push(
                 Diagnostic::error(key.span, format!("this part has no `{symbol}`"))
-                    .label("what the part itself leaves at zero does not differ either")
+                    .label("a quantity that is exactly zero in the part has no difference")
                     .help(format!("here there are {}", those.join(", "))),
             );
         }
     }
 
-    /// The differences of each part as a further part of its frame.
+    /// The differences of each part as a further part on its frame, about the origin of that frame.
     fn bodies(
         &self,
         terms: &[EffectTerm],
         places: &[EffectPlace],
         scene: &EffectTargets<'_>,
     ) -> EffectBodies {
+        // The parameter of a difference, or zero if the effect does not have it.
         let value = |i: usize| {
             let term = terms.iter().find(|term| term.symbol == DIFFERENCES[i].0);
             term.map_or_else(ExactExpression::zero, |term| {
@@ -112,6 +121,7 @@ impl MechanicsEntry for PartMechanics {
                 return None;
             };
             let part = &scene.parts[part.0];
+            // The further part is linear in the differences, about the origin of the frame.
             Some(ModelPart {
                 name: part.name.clone(),
                 frame: part.frame,
@@ -128,11 +138,12 @@ impl MechanicsEntry for PartMechanics {
         }
     }
 
-    /// Where the part shares its parameters with another one.
+    /// Only if the part shares its parameters with another one; otherwise its own parameters cover the differences.
     fn has_effect_at(&self, mechanism: &Mechanism, place: EffectPlace) -> bool {
         let EffectPlace::Part(part) = place else {
             return false;
         };
+        // Another part with one of the same parameters ties the two parts together.
         let parts = &mechanism.parts;
         let own = shared_parameters(&parts[part.0].inertial);
         let mut others = parts.iter().enumerate().filter(|(i, _)| *i != part.0);
@@ -150,7 +161,8 @@ fn is_only_one(parts: &[ModelPart], part: usize) -> bool {
     same.count() == 1
 }
 
-/// The quantities that a part has, by the symbols of their differences.
+/// The symbols of the differences that a part can have: those of its quantities that are not exactly zero.
+/// Mass, moments and inertia in the order of the differences.
 fn components(inertial: &PartInertia) -> Vec<&'static str> {
     let (mass, moments, inertia) = match inertial {
         PartInertia::AboutCentre {
@@ -173,7 +185,8 @@ fn components(inertial: &PartInertia) -> Vec<&'static str> {
         .collect()
 }
 
-/// The parameters of mass and inertia that another part may have too.
+/// The parameters in mass and inertia of a part, which other parts may share.
+/// The centre is not included, because it describes one part only.
 fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
     let (PartInertia::AboutCentre { mass, inertia, .. }
     | PartInertia::Linear { mass, inertia, .. }) = inertial;

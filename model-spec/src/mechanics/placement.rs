@@ -1,4 +1,4 @@
-//! The moments of lumped masses, taken where their forces are.
+//! A correction of lumped masses: their moments are taken at the point of their forces.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -9,6 +9,7 @@ use crate::mechanism::{EffectBodies, EffectPlace, EffectTerm, FramePoint, Lumped
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Placement`].
 pub(crate) struct PlacementMechanics;
 
 impl MechanicsEntry for PlacementMechanics {
@@ -39,6 +40,7 @@ impl MechanicsEntry for PlacementMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // The effect corrects only masses with two different places.
         if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
                 Diagnostic::error(
@@ -46,12 +48,13 @@ impl MechanicsEntry for PlacementMechanics {
                     "no lumped mass here has different places for forces and for moments",
                 )
                 .label("expected the point at which the forces of such a mass are taken")
-                .help("this effect corrects a `[[lumped_mass]]` whose `moment_at` differs from its `force_at`; for a mass that the model lacks, take `point_mass`"),
+                .help("this effect corrects a `[[lumped_mass]]` whose `moment_at` differs from its `force_at`; for a mass that the model lacks, use `point_mass`"),
             );
         }
     }
 
-    /// Masses where forces are taken, less such whose moments are taken elsewhere: what is left are moments.
+    /// Masses at the point of the forces, minus masses whose moments are at `moment_at`. Forces cancel, and a moment
+    /// remains.
     fn bodies(
         &self,
         terms: &[EffectTerm],
@@ -61,9 +64,11 @@ impl MechanicsEntry for PlacementMechanics {
         let mut bodies = EffectBodies::default();
         for term in terms {
             let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
+            // All lumped masses at all places of the effect share the parameter.
             let all = places.iter().flat_map(|place| {
                 displaced_masses(*place, &scene.points.points, scene.lumped_masses)
             });
+            // The first mass has both places at the point; the second one, negative, keeps the places of the file.
             for lump in all {
                 bodies.lumped_masses.push(LumpedMass {
                     mass: mass.clone(),
@@ -84,10 +89,12 @@ impl MechanicsEntry for PlacementMechanics {
         !displaced_masses(place, &mechanism.points, &mechanism.lumped_masses).is_empty()
     }
 
-    /// Shares of one mass are misplaced together.
+    /// Places with the same masses belong together, because these are shares of one mass.
     fn groups(&self, mechanism: &Mechanism, places: &[EffectPlace]) -> Option<Vec<Vec<usize>>> {
+        // Groups by the list of masses at each place.
         let mut groups: Vec<(Vec<&ExactExpression>, Vec<usize>)> = Vec::new();
         for (i, place) in places.iter().enumerate() {
+            // The masses whose moments are misplaced at this point.
             let lumps = displaced_masses(*place, &mechanism.points, &mechanism.lumped_masses);
             let masses: Vec<&ExactExpression> = lumps.into_iter().map(|lump| &lump.mass).collect();
             match groups.iter_mut().find(|(known, _)| *known == masses) {
@@ -99,7 +106,8 @@ impl MechanicsEntry for PlacementMechanics {
     }
 }
 
-/// Lumped masses whose forces are taken at a point, but whose moments elsewhere.
+/// Lumped masses whose forces are taken at a point, and whose moments are taken at another one.
+/// Such a mass is on the frame of the point, and its forces act exactly there.
 fn displaced_masses<'a>(
     place: EffectPlace,
     points: &[FramePoint],

@@ -1,4 +1,6 @@
 //! A slender rod along a linear drive, such as its screw.
+//!
+//! Its generalised force is derived in `regressor/mechanics` of `modelmill-codegen`.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -8,6 +10,7 @@ use crate::mechanism::{DriveKind, EffectPlace, Mechanism, ModelDrive};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Rod`].
 pub(crate) struct RodMechanics;
 
 impl MechanicsEntry for RodMechanics {
@@ -16,7 +19,7 @@ impl MechanicsEntry for RodMechanics {
     }
 
     fn introduction(&self) -> &'static str {
-        "a rod that turns about the first point and slides through the second; its second and first moment about the \
+        "a rod that rotates about the first point and slides through the second; its second and first moment about the \
          first point, and its mass: "
     }
 
@@ -24,7 +27,7 @@ impl MechanicsEntry for RodMechanics {
         ActsOn::Drive
     }
 
-    /// Moments of its mass along itself, of second, first and no order.
+    /// Moments of its mass along itself, of order two, one and zero.
     fn parameters(&self) -> MechanicsSymbols {
         &[
             ("Jr", UnitDimension::INERTIA),
@@ -44,10 +47,11 @@ impl MechanicsEntry for RodMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // A rod needs the line between the two points of a drive.
         if !is_line(scene.drives, place) {
             log.push(
                 Diagnostic::error(name.span, "a rod cannot act here")
-                    .label("this drive is no line between two points")
+                    .label("this drive is not a line between two points")
                     .help("a rod lies along a drive with `linear = { from = ..., to = ... }`"),
             );
         }
@@ -58,6 +62,8 @@ impl MechanicsEntry for RodMechanics {
     }
 }
 
+/// Whether a place is a linear drive, which has two points.
+/// Only a linear drive has a line.
 fn is_line(drives: &[ModelDrive], place: EffectPlace) -> bool {
     let EffectPlace::Drive(drive) = place else {
         return false;

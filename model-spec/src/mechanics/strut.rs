@@ -1,4 +1,6 @@
 //! A passive element along the line between two points, such as a gas strut, a spring or a damper.
+//!
+//! It has a constant force, a stiffness and a damping along the line, so that it is linear in its parameters.
 
 use crate::build::effect_places::EffectTargets;
 use crate::diagnostic::{Diagnostic, DiagnosticLog};
@@ -8,6 +10,7 @@ use crate::mechanism::{DriveKind, EffectPlace, KinematicLoop, Mechanism, ModelDr
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Strut`].
 pub(crate) struct StrutMechanics;
 
 impl MechanicsEntry for StrutMechanics {
@@ -23,7 +26,7 @@ impl MechanicsEntry for StrutMechanics {
         ActsOn::Point
     }
 
-    /// Of no order in the distance, of first order, and of first order in its rate.
+    /// The constant force, the stiffness and the damping.
     fn parameters(&self) -> MechanicsSymbols {
         &[
             ("F0", UnitDimension::FORCE),
@@ -43,11 +46,13 @@ impl MechanicsEntry for StrutMechanics {
         scene: &EffectTargets<'_>,
         log: &mut DiagnosticLog,
     ) {
+        // Points on one frame have a constant distance, so the element has no effect.
         let frame = |place: &EffectPlace| match place {
             EffectPlace::Point(point) => Some(scene.points.points[point.0].frame),
             _ => None,
         };
         let frames: Vec<_> = places.iter().map(frame).collect();
+        // The second point is marked, because the first one is the reference.
         if let ([_, second], [a, b]) = (names, frames.as_slice())
             && a == b
         {
@@ -63,14 +68,17 @@ impl MechanicsEntry for StrutMechanics {
         false
     }
 
-    /// Pairs of points on which nothing else stands: whoever declares such says that something may be attached there.
+    /// Pairs of points that no loop and no drive uses. Such points are declared for elements that may be attached
+    /// there.
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
+        // Points of loops and drives have another purpose.
         let is_free = |p: &PointIdx| {
             !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p)
         };
         let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
+        // Each pair of free points on different frames.
         for (i, one) in free.iter().enumerate() {
             for other in &free[i + 1..] {
                 if points[one.0].frame != points[other.0].frame {
@@ -82,10 +90,12 @@ impl MechanicsEntry for StrutMechanics {
     }
 }
 
+/// Whether a point is an end of a loop.
 fn is_loop_end(loops: &[KinematicLoop], point: PointIdx) -> bool {
     loops.iter().any(|one| one.joins.contains(&point))
 }
 
+/// Whether a point is an end of a linear drive.
 fn is_drive_end(drives: &[ModelDrive], point: PointIdx) -> bool {
     drives.iter().any(|drive| match drive.kind {
         DriveKind::Linear { from, to } => from == point || to == point,

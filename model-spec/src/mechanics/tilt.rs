@@ -1,4 +1,6 @@
-//! A base that stands turned by Rz(tz) Ry(ty) Rx(tx) against the one in which gravity was given.
+//! A base that is rotated by Rz(tz) Ry(ty) Rx(tx) relative to the frame in which gravity is given.
+//!
+//! Gravity is rotated instead of the base, so that all frames stay as they are.
 
 use crate::build::symbols::SymbolTable as Names;
 use crate::diagnostic::DiagnosticLog;
@@ -10,15 +12,16 @@ use crate::scope::{SymbolSort, symbol_meaning};
 use crate::unit::UnitDimension;
 use crate::values::SpannedName;
 
+/// The entry of [`crate::Mechanics::Tilt`]: three constant angles, rad, and no parameters.
 pub(crate) struct TiltMechanics;
 
 impl MechanicsEntry for TiltMechanics {
     fn description(&self) -> &'static str {
-        "gravity turned back by Rz(tz) Ry(ty) Rx(tx)"
+        "gravity rotated back by Rz(tz) Ry(ty) Rx(tx)"
     }
 
     fn introduction(&self) -> &'static str {
-        "turns the base by "
+        "rotates the base by "
     }
 
     fn constant_label(&self, symbol: &str) -> &'static str {
@@ -41,8 +44,8 @@ impl MechanicsEntry for TiltMechanics {
         ]
     }
 
-    /// Each angle as a constant with a name: their sines and cosines stay exact, and generated code can be given other
-    /// ones. Zeros are left out.
+    /// Each angle becomes a named constant, so that its sine and cosine stay exact and generated code can change it.
+    /// Angles of zero are dropped.
     fn named_constants(
         &self,
         values: Vec<(String, ExactExpression)>,
@@ -51,17 +54,21 @@ impl MechanicsEntry for TiltMechanics {
         log: &mut DiagnosticLog,
     ) -> Option<Vec<(String, ExactExpression)>> {
         let mut named = Vec::new();
+        // Zero angles would only lengthen the expressions of gravity.
         for (symbol, angle) in values {
             if angle.is_zero() {
                 continue;
             }
+            // An angle that is an expression over constants of the file needs no name of its own.
             if angle.mentions(&|_| true) {
                 named.push((symbol, angle));
                 continue;
             }
+            // A number becomes the constant `tx_base`, `ty_base` or `tz_base`.
             let name = format!("{symbol}_base");
             let idx = ConstantIdx(names.constants.len());
             let value = angle.evaluate(&|_| 0.0);
+            // The name must be new in the model; a clash is reported at the kind of the effect.
             let mut meaning = symbol_meaning(
                 SymbolSort::Constant,
                 ModelSymbol::Constant(idx),
@@ -86,13 +93,15 @@ impl MechanicsEntry for TiltMechanics {
         Some(named)
     }
 
-    /// The transposed rotations, the outermost first.
+    /// Applies the transposed rotations, the outermost first: with R = Rz(tz) Ry(ty) Rx(tx) this is R' g = Rx' Ry' Rz' g.
     fn gravity(
         &self,
         effect: &ModelEffect,
         mut gravity: [ExactExpression; 3],
     ) -> [ExactExpression; 3] {
+        // Each rotation mixes the two components that are not along its axis.
         for (symbol, [from, to]) in [("tz", [0, 1]), ("ty", [2, 0]), ("tx", [1, 2])] {
+            // An angle of zero was dropped, so its rotation is skipped.
             let Some((_, angle)) = effect.constants.iter().find(|(name, _)| name == symbol) else {
                 continue;
             };
@@ -106,6 +115,7 @@ impl MechanicsEntry for TiltMechanics {
     }
 }
 
+/// A product, or zero if the second factor is zero.
 fn times(a: &ExactExpression, b: &ExactExpression) -> ExactExpression {
     if b.is_zero() {
         return ExactExpression::zero();
@@ -113,6 +123,7 @@ fn times(a: &ExactExpression, b: &ExactExpression) -> ExactExpression {
     ExactExpression::Product(vec![a.clone(), b.clone()])
 }
 
+/// The negative; zero stays zero.
 fn negative(a: ExactExpression) -> ExactExpression {
     if a.is_zero() {
         return a;
@@ -120,6 +131,7 @@ fn negative(a: ExactExpression) -> ExactExpression {
     ExactExpression::Negative(Box::new(a))
 }
 
+/// A sum without terms that are zero.
 fn sum([a, b]: [ExactExpression; 2]) -> ExactExpression {
     match (a.is_zero(), b.is_zero()) {
         (true, _) => b,

@@ -247,7 +247,7 @@ fn what_cannot_be_is_said() {
             .contains("a finite number is expected")
     );
     let broken = add_effect("effect = 3", &effect("spring", &["q"])).unwrap_err();
-    assert!(matches!(broken, EditFailure::Effect(says) if says.contains("no list of tables")));
+    assert!(matches!(broken, EditFailure::Effect(says) if says.contains("not a list of tables")));
     assert!(add_effect("a = [", &effect("spring", &["q"])).is_err());
 }
 

@@ -63,11 +63,11 @@ fn a_file_that_is_no_text_in_utf_8() {
         .render(false)
         .replace(&*path.to_string_lossy(), "latin.toml");
     insta::assert_snapshot!(says, @r#"
-    error: this file is no text in UTF-8
+    error: this file is not UTF-8 text
      --> latin.toml:2:17
       |
     2 | name = "arm" # m�de
-      |                 ^ the first byte that is not
+      |                 ^ the first invalid byte
       |
       = help: save it as UTF-8; `modelmill` reads model files as text (TOML)
     "#);
@@ -118,7 +118,7 @@ fn what_cannot_move_is_told_where_to_look() {
     );
     let says = failure(&braced).render(false);
     assert!(
-        says.contains("this mechanism cannot move: its loops tie all 4 coordinates")
+        says.contains("this mechanism cannot move: its loops constrain all 4 coordinates")
             && says.contains("a joint that is missing")
             && !says.contains("mark 1 coordinate more"),
         "{says}"
@@ -136,7 +136,7 @@ fn what_cannot_move_is_told_where_to_look() {
 fn what_cannot_move_is_no_model_without_drives_either() {
     let says = failure(TRIANGLE).render(false);
     assert!(
-        says.contains("this mechanism cannot move: its loops tie all 2 coordinates"),
+        says.contains("this mechanism cannot move: its loops constrain all 2 coordinates"),
         "{says}"
     );
 }

@@ -1,5 +1,5 @@
-//! Forces that were read later than they act, or earlier: all drives together where their clock is another, some of them where
-//! theirs is.
+//! Delay of the force signals relative to the motion, positive or negative: of all drives if their clock differs, of
+//! some drives if the clocks of these differ. A segment goes in, a note with the delay comes out.
 
 use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 
@@ -8,37 +8,48 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::{percent, significant};
 
-/// Samples of all drives that are looked at, spread over the recording, and the fewest of each.
+/// Largest number of samples over all drives, spread over the recording.
 const LOOKED_AT: usize = 9000;
+/// Smallest number of samples for each drive.
 const FEWEST: usize = 1200;
-/// Longest delay that is looked for, s, or in samples where these are few, and in parts of the recording.
+/// Longest delay that is searched for, s.
 const LONGEST: f64 = 0.25;
+/// The same in samples, for recordings with few samples per second.
 const LONGEST_SAMPLES: f64 = 64.0;
+/// The same as a fraction of the recording.
 const LONGEST_PART: f64 = 0.1;
-/// Part of a drive's fastest rate below which its friction may be about to reverse, which has its own way of coming late.
+/// Fraction of a drive's fastest rate below which a sample is not used: friction near reversals causes an apparent
+/// delay.
 const SLOW: f64 = 0.1;
 
-/// How many times the half width of its interval a delay must be to be told, as what a model lacks is not quite at random.
+/// A delay is reported if it exceeds the half width of its interval by this factor, since model errors are not random.
 const CLEAR: f64 = 1.5;
-/// The same of a drive that alone is late: laws that the model lacks are often at one drive.
+/// The same for a drive that alone is delayed: missing laws often act on one drive.
 const CLEAR_ALONE: f64 = 3.0;
-/// The shortest delay that is told, in samples: of all drives, and of some.
+/// The shortest delay that is reported, in samples: for all drives.
 const LEAST: f64 = 0.2;
+/// The same for single drives.
 const LEAST_ALONE: f64 = 0.3;
-/// Delays that differ by less than this part of a sample are alike.
+/// Delays that differ by less than this fraction of a sample are equal.
 const ALIKE: f64 = 0.1;
-/// Parts by which what is left must fall: of all drives, of the drive that alone is late, and for a warning.
+/// Required decrease of the residual for a delay of all drives, as a fraction.
 const GAIN: f64 = 0.003;
+/// The same for a drive that alone is delayed.
 const GAIN_ALONE: f64 = 0.03;
+/// Decrease of the residual from which on the note is a warning.
 const GRAVE: f64 = 0.1;
 
-/// What the forces come later or earlier than the motion by.
+/// Delays of the force signals of a segment.
 pub(super) struct ForceDelayAudit {
+    /// Delays of all drives together and of each drive, with residuals.
     delays: ForceDelays,
+    /// Time between samples, s.
     step: f64,
 }
 
 impl ForceDelayAudit {
+    /// Estimates the delays; `None` if forces are missing, the segment is too short, or a pose has no
+    /// solution.
     pub(super) fn from_segment(model: &Model, data: &RecordingSegment) -> Option<Self> {
         let run = &data.run;
         let forces = run.force.as_deref()?;
@@ -48,6 +59,7 @@ impl ForceDelayAudit {
         let longest = LONGEST
             .max(LONGEST_SAMPLES * step)
             .min(LONGEST_PART * duration);
+        // Both ends are excluded by the longest delay, so that every shifted sample exists.
         let from = run.time.partition_point(|t| *t < run.time[0] + longest);
         let to = run
             .time
@@ -57,6 +69,7 @@ impl ForceDelayAudit {
         let samples: Vec<usize> = (from..to).step_by(every).collect();
         let rows = AuditRows::new(model, data, &samples)?;
         let drives = forces.len();
+        // Samples near reversals of a drive are not used.
         let mut counts = vec![false; samples.len() * drives];
         for (d, rates) in rows.motion[1].iter().enumerate() {
             let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -77,25 +90,25 @@ impl ForceDelayAudit {
         Some(Self { delays, step })
     }
 
-    /// What is left with what is found to be late taken into account, relative to what is left without; the geometric mean over
-    /// the drives.
+    /// Relative decrease of the residual with the delay, as a geometric mean over the drives. `with` is 1 for the
+    /// common delay and 2 for delays of single drives.
     fn gain(&self, with: usize) -> f64 {
         let [before, after] = [0, with].map(|which| geometric_mean(&self.delays.residuals[which]));
         1.0 - after / before.max(f64::MIN_POSITIVE)
     }
 
-    /// The delay that all drives have, if that is how it is.
+    /// The delay that all drives share; `None` if they differ, or if it is not clear.
     fn common_delay(&self) -> Option<DelayEstimate> {
         let all = self.delays.common;
         let alone = &self.delays.by_channel;
-        // A clock delays all forces alike; where drives differ, it is a law that the model lacks.
+        // A clock delays all forces alike; if drives differ, the model lacks a law.
         let differ = |one: &DelayEstimate, other: &DelayEstimate| {
             let apart = (one.seconds - other.seconds).abs();
             apart > CLEAR * one.half_width.hypot(other.half_width) + ALIKE * self.step
         };
         let agree = (alone.iter().enumerate())
             .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
-        // Two drives at least must tell of themselves.
+        // At least two drives must show the delay on their own.
         let telling = |one: &&DelayEstimate| {
             one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0
         };
@@ -104,13 +117,14 @@ impl ForceDelayAudit {
         (agree && is_there).then_some(all)
     }
 
-    /// Drives whose forces are late where others tell that they are not.
+    /// Drives whose force signals are delayed while those of the other drives are clearly not.
     fn delayed_drives(&self) -> Vec<usize> {
         let ForceDelays {
             by_channel: alone,
             residuals: left,
             ..
         } = &self.delays;
+        // A delayed drive must be clear and must reduce its own residual.
         let late: Vec<usize> = (0..alone.len())
             .filter(|d| self.is_clear(alone[*d], CLEAR_ALONE, LEAST_ALONE))
             .filter(|d| left[2][*d] < (1.0 - GAIN_ALONE) * left[0][*d])
@@ -120,6 +134,7 @@ impl ForceDelayAudit {
             return Vec::new();
         };
         let is_late = |d: usize| late.contains(&d);
+        // The other drives must show that the common clock is correct.
         let others = || (0..alone.len()).filter(|d| !is_late(*d)).map(|d| alone[d]);
         let in_time =
             others().all(|one| one.seconds.abs() < CLEAR * one.half_width + ALIKE * self.step);
@@ -133,11 +148,12 @@ impl ForceDelayAudit {
         }
     }
 
+    /// Whether a delay exceeds its uncertainty by the factor `clear`, and `least` samples.
     fn is_clear(&self, delay: DelayEstimate, clear: f64, least: f64) -> bool {
         delay.seconds.abs() > (clear * delay.half_width).max(least * self.step)
     }
 
-    /// What is left with the delay, as the geometric mean over the drives of their relative errors, where one is told.
+    /// The residual with the delay, as the geometric mean of relative errors over the drives; `None` without a delay.
     pub(super) fn residual_with_delay(&self) -> Option<f64> {
         if self.common_delay().is_some() {
             Some(geometric_mean(&self.delays.residuals[1]))
@@ -146,7 +162,7 @@ impl ForceDelayAudit {
         }
     }
 
-    /// What is to be said.
+    /// The note on the delay; `None` without one. `file` is the name of the recording.
     pub(super) fn delay_note(&self, model: &Model, file: &str) -> Option<RecordingNote> {
         let names = model.drives();
         if let Some(all) = self.common_delay() {
@@ -161,7 +177,7 @@ impl ForceDelayAudit {
             .map(|d| {
                 let one = self.delays.by_channel[*d];
                 format!(
-                    "The force of `{}` comes {} than the motion that the model explains it by: {}.",
+                    "The force of `{}` comes {} than the motion that causes it in the model: {}.",
                     names[*d],
                     direction_word(one),
                     self.delay_text(one)
@@ -169,7 +185,7 @@ impl ForceDelayAudit {
             })
             .collect();
         let says = format!(
-            "{} That is so in {file}; forces of the other drives are in time.{} Look at how its samples are stamped, and shift \
+            "{} This holds for {file}; the forces of the other drives are not delayed.{} Check its time stamps, and shift \
              its column.",
             each.join(" "),
             self.gain_text(2)
@@ -177,9 +193,10 @@ impl ForceDelayAudit {
         Some(self.graded_note(2, says))
     }
 
-    /// The note of a delay that all drives have.
+    /// The note on a delay that all drives share.
     fn common_delay_note(&self, all: DelayEstimate, names: &[String], file: &str) -> RecordingNote {
         let amount = self.delay_text(all);
+        // The delays of single drives show how well they agree.
         let mut each = String::new();
         if names.len() > 1 {
             let of = names
@@ -193,30 +210,33 @@ impl ForceDelayAudit {
                     )
                 });
             let of: Vec<String> = of.collect();
-            each = format!(" Each drive by itself, in samples: {}.", of.join(", "));
+            each = format!(" Delay of each drive, in samples: {}.", of.join(", "));
         }
         let worth = self.gain_text(1);
+        // A lead of up to one sample is normal for controllers, and only noted.
         if all.seconds < 0.0 && -all.seconds < self.step + all.half_width {
             return RecordingNote::info(format!(
-                "The forces in {file} lead the motion by {amount}, as where a controller sets them after it has read the \
+                "The forces in {file} lead the motion by {amount}, which is normal if a controller sets them after reading the \
                  positions.{each}{worth}"
             ));
         }
+        // Only a delay can be modelled by `time_delay`.
         let mend = if all.seconds > 0.0 {
             format!(
-                " An effect `time_delay` at `force` with T = {} s in the model file takes it out.",
+                " An effect `time_delay` at `force` with T = {} s in the model file compensates for it.",
                 significant(all.seconds, 3)
             )
         } else {
             String::new()
         };
         let says = format!(
-            "The forces in {file} come {} than the motion that the model explains them by: {amount}.{each}{worth}{mend}",
+            "The forces in {file} come {} than the motion that causes them in the model: {amount}.{each}{worth}{mend}",
             direction_word(all)
         );
         self.graded_note(1, says)
     }
 
+    /// The size of a delay in samples and ms with its interval.
     fn delay_text(&self, delay: DelayEstimate) -> String {
         format!(
             "{} samples or {} ms (+- {} ms, 99 %)",
@@ -226,15 +246,16 @@ impl ForceDelayAudit {
         )
     }
 
-    /// What taking a delay out gains.
+    /// The residuals with and without the delay, as a sentence.
     fn gain_text(&self, with: usize) -> String {
         let [before, after] =
             [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
         format!(
-            " With that the best fit is off by {after} rather than {before} (geometric mean over the drives, away from reversals)."
+            " With the delay the best fit has an error of {after} instead of {before} (geometric mean over the drives, away from reversals)."
         )
     }
 
+    /// The note as a warning if the delay causes a large part of the residual.
     fn graded_note(&self, with: usize, says: String) -> RecordingNote {
         if self.gain(with) > GRAVE {
             RecordingNote::warning(says)
@@ -244,6 +265,7 @@ impl ForceDelayAudit {
     }
 }
 
+/// The sign of a delay as a word.
 fn direction_word(delay: DelayEstimate) -> &'static str {
     if delay.seconds > 0.0 {
         "later"
@@ -252,13 +274,13 @@ fn direction_word(delay: DelayEstimate) -> &'static str {
     }
 }
 
-/// The geometric mean.
+/// The geometric mean of positive numbers.
 fn geometric_mean(parts: &[f64]) -> f64 {
     let logarithms = parts.iter().map(|part| part.max(f64::MIN_POSITIVE).ln());
     (logarithms.sum::<f64>() / parts.len().max(1) as f64).exp()
 }
 
-/// Two decimals where they say something.
+/// A number with two decimals, or one from 10 on.
 fn rounded_text(value: f64) -> String {
     if value.abs() < 10.0 {
         format!("{value:.2}")

@@ -1,11 +1,11 @@
-//! Contacts and pushes: for an interval of time forces act that no parameters explain. A stretch goes in; its events, told with
-//! their times, drives and sizes, come out.
+//! Contacts and pushes: intervals of time in which forces act that no parameters explain. A segment goes in, its
+//! events with times, drives and sizes come out.
 //!
-//! The regressor with friction and an offset of every drive is fitted to the forces by Huber's function, so that an event does
-//! not pull the fit to itself. A law that the model lacks leaves errors that come again with the motion; an event is rare, lasts,
-//! and stands far above all that the rest of the run leaves.
+//! The regressor, with friction and an offset of every drive added, is fitted to the forces with Huber's function, so
+//! that an event does not bias the fit. A law that the model lacks leaves errors that repeat with the motion. An
+//! event is rare, lasts for some time, and is far larger than the residual of the rest of the run.
 //!
-//! Decision: an event must not repeat where position, rate, acceleration and force of its drive are alike. If it
+//! Decision: an event must not repeat where position, rate, acceleration and force of its drive are similar. If it
 //! repeats, it is a law that the model lacks.
 
 use modelmill_boundary::message;
@@ -19,43 +19,49 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::significant;
 
-/// Samples that are looked at.
+/// Number of samples that are evaluated in a short run.
 const LOOKED_AT: usize = 4000;
-/// Samples per second that are looked at in a long run.
+/// Samples per second that are evaluated in a long run.
 const FINE: f64 = 25.0;
-/// Samples whose median counts: single outliers are none.
+/// Smallest width of the median filter, in samples, which removes single outliers.
 const FEWEST_TOGETHER: usize = 5;
+/// Largest width of the median filter, in samples.
 const MOST_TOGETHER: usize = 11;
-/// An event stands so many times above what four fifths of the run stay below.
+/// An event exceeds the usual residual by this factor.
 const ABOVE: f64 = 5.0;
+/// The usual residual is the one that this fraction of the run stays below.
 const USUAL: f64 = 0.8;
-/// And it is at least this part of the drive's force.
+/// An event is at least this fraction of the drive's force.
 const LEAST: f64 = 0.02;
-/// What happens more often, or for longer, is how the machine is.
+/// Largest number of events in a run; more are a property of the machine.
 const MOST: usize = 4;
+/// Largest fraction of the run that events may last.
 const LONGEST: f64 = 0.15;
-/// An event lasts at least so long, s.
+/// Shortest event, s.
 const SHORTEST: f64 = 0.1;
-/// So many samples of an event are held against the nearest of the rest of the run: none further than so many deviations of the
-/// states, with less than this part of what is left.
+/// Number of samples of an event that are compared with the rest of the run.
 const COMPARED: usize = 40;
+/// Number of nearest samples of the rest for each of them.
 const NEIGHBOURS: usize = 5;
+/// Largest distance of such a neighbour, in standard deviations of the states.
 const NEAR: f64 = 1.0;
+/// Neighbours with less than this fraction of the residual show that it does not repeat.
 const ALIKE: f64 = 0.4;
-/// Part of its fastest rate below which a drive may turn round.
+/// Fraction of its fastest rate below which a drive may be reversing.
 const SLOW: f64 = 0.1;
 
-/// An interval in which forces act that no parameters explain.
+/// An interval of time in which forces act that no parameters explain.
 #[derive(Clone, Debug)]
 pub(crate) struct ContactEvent {
-    /// When it begins and ends, s.
+    /// Start of the interval, s.
     pub(crate) from: f64,
+    /// End of the interval, s.
     pub(crate) to: f64,
-    /// The drives on which it shows, each with the largest force that is not explained and with what is usual.
+    /// The drives on which it acts, each with the largest unexplained force and the usual one, N or N m.
     pub(crate) drives: Vec<(usize, f64, f64)>,
 }
 
-/// Remarks on the events of a stretch; their forces count no more where they are to be left out.
+/// Notes on the events of a segment. With `leave_out`, their forces are excluded.
 pub(super) fn event_notes(
     model: &Model,
     data: &mut RecordingSegment,
@@ -64,6 +70,7 @@ pub(super) fn event_notes(
     let events = events(model, data).unwrap_or_default();
     let names = model.drives();
     let mut notes = Vec::new();
+    // Each event becomes a note for the user and a disturbance for the diagnosis.
     for event in &events {
         let drives: Vec<String> = event
             .drives
@@ -80,15 +87,15 @@ pub(super) fn event_notes(
             .collect();
         let option = Remedy::option(OptionName::LeaveOutEvents);
         notes.push(RecordingNote::warning(message!(
-            "From {} to {} s of {} forces differ from all that parameters explain, {}, as in a contact or a push{}",
+            "From {} to {} s of {} there are forces that no parameters explain, {}, as in a contact or a push{}",
             significant(event.from, 5),
             significant(event.to, 5),
             data.run.file,
             drives.join(" and "),
             if leave_out {
-                message!(". They are left out of fits and figures ({}).", option)
+                message!(". They are left out of fits and error figures ({}).", option)
             } else {
-                message!("; {} leaves them out of fits and figures.", option)
+                message!("; {} leaves them out of fits and error figures.", option)
             }
         )));
     }
@@ -113,7 +120,7 @@ pub(super) fn event_notes(
     notes
 }
 
-/// Forces within events count no more.
+/// Excludes the forces of all drives during events.
 pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEvent]) {
     if events.is_empty() {
         return;
@@ -131,7 +138,7 @@ pub(crate) fn leave_out_events(data: &mut RecordingSegment, events: &[ContactEve
     }
 }
 
-/// The events of a stretch; `None` where too little is there to tell.
+/// The events of a segment; `None` if there are too few samples, or if events are so many that they are no exception.
 pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<ContactEvent>> {
     let run = &data.run;
     let forces = run.force.as_deref()?;
@@ -144,11 +151,13 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
     if samples.len() < 40 * MOST_TOGETHER {
         return None;
     }
+    // The residual of a robust fit is compared with its own usual level, drive by drive.
     let rest = UnexplainedForces::new(model, data, forces, &samples)?;
     let levels: Vec<ResidualLevel> = (0..forces.len()).map(|d| rest.level(d, together)).collect();
     let flagged: Vec<bool> = (0..samples.len())
         .map(|i| levels.iter().any(|level| level.values[i] > level.bound))
         .collect();
+    // Samples at reversals neither start nor end an event.
     let is_idle = |i: usize| (levels.iter()).all(|level| level.reverses[i]);
     let mut events = Vec::new();
     let mut lasted = 0;
@@ -167,6 +176,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
             }
             i += 1;
         }
+        // The interval is widened by half the filter, which smears its ends.
         let reach = |k: usize| run.time[samples[k.min(samples.len() - 1)]];
         let [from, to] = [
             reach(start.saturating_sub(together / 2)),
@@ -174,6 +184,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         ];
         let lasts = |end: usize| reach(end - 1) - reach(start) >= SHORTEST;
         if end > start && lasts(end) {
+            // A drive belongs to the event unless its residual repeats elsewhere.
             let around = start.saturating_sub(together)..end + together;
             let concerned = levels.iter().enumerate().filter_map(|(d, level)| {
                 let is_in = |i: &usize| level.values[*i] > level.bound;
@@ -190,28 +201,39 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         }
         i = i.max(start + 1);
     }
+    // What happens often or for long is no event.
     let is_rare = events.len() <= MOST && (lasted as f64) < LONGEST * flagged.len() as f64;
     is_rare.then_some(events)
 }
 
-/// What no parameters explain of the forces.
+/// Forces that no parameters explain, as the residual of a robust fit.
 struct UnexplainedForces {
+    /// Number of drives.
     drives: usize,
+    /// Residual, interleaved per sample; zero where the force does not count.
     rest: DVector<f64>,
+    /// Measured forces, interleaved.
     measured: DVector<f64>,
+    /// Regressor and motion of the samples.
     rows: AuditRows,
+    /// Whether each force was measured, interleaved.
     counts: Vec<bool>,
 }
 
-/// What is left of a drive's force along a run: medians of neighbours, what is usual of them, and what is too much.
+/// The residual of a drive along a run.
 struct ResidualLevel {
+    /// Median of the magnitude over neighbouring samples, N or N m; zero at reversals.
     values: Vec<f64>,
+    /// Whether the drive reverses or is at standstill, for each sample.
     reverses: Vec<bool>,
+    /// Usual size of the values.
     usual: f64,
+    /// Size above which a value belongs to an event.
     bound: f64,
 }
 
 impl UnexplainedForces {
+    /// Fits the model at the given samples; `None` if a pose has no solution or the fit fails.
     fn new(
         model: &Model,
         data: &RecordingSegment,
@@ -227,7 +249,7 @@ impl UnexplainedForces {
         let counts: Vec<bool> = (samples.iter())
             .flat_map(|k| (0..drives).map(move |d| data.run.is_force_measured(d, *k)))
             .collect();
-        // A long run is fitted on a part of its samples.
+        // A long run is fitted on some of its samples, but all residuals are computed.
         let every = (samples.len() / LOOKED_AT).max(1);
         let some: Vec<usize> = (0..samples.len())
             .step_by(every)
@@ -253,10 +275,12 @@ impl UnexplainedForces {
         })
     }
 
+    /// Number of samples.
     fn samples(&self) -> usize {
         self.counts.len() / self.drives
     }
 
+    /// The residual level of drive `d`, with a median over `together` samples.
     fn level(&self, d: usize, together: usize) -> ResidualLevel {
         let n = self.samples();
         let at = |i: usize| i * self.drives + d;
@@ -282,8 +306,9 @@ impl UnexplainedForces {
         }
     }
 
-    /// Whether what is left of a drive's force at some samples comes again where its position, rate, acceleration and force are
-    /// alike, outside of a range: then it is a law that the model lacks. So it is taken to be where they are nowhere alike.
+    /// Whether the residual of a drive at some samples repeats outside of a range, where its position, rate,
+    /// acceleration and force are similar. Then it is a law that the model lacks. This is also assumed if there are
+    /// no similar states.
     fn is_repeatable(
         &self,
         d: usize,
@@ -302,11 +327,13 @@ impl UnexplainedForces {
             &self.rows.motion[2][d],
             &explained,
         ];
+        // States are scaled by their standard deviations.
         let scales = states.map(|values| {
             let mean = values.iter().sum::<f64>() / n as f64;
             let sum: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
             (n as f64 / sum.max(f64::MIN_POSITIVE)).sqrt()
         });
+        // Only measured samples away from reversals can be neighbours.
         let others: Vec<usize> = (0..n)
             .filter(|i| !around.contains(i) && !reverses[*i] && self.counts[at(*i)])
             .collect();
@@ -332,6 +359,7 @@ impl UnexplainedForces {
             near.select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0));
             let near = &near[..NEIGHBOURS];
             let is_near = near.iter().all(|(apart, _)| *apart < NEAR * NEAR);
+            // The mean residual of the neighbours is compared with that of the event.
             let theirs =
                 near.iter().map(|(_, k)| self.rest[at(*k)]).sum::<f64>() / NEIGHBOURS as f64;
             let own = self.rest[at(*i)];
@@ -341,13 +369,13 @@ impl UnexplainedForces {
     }
 }
 
-/// Samples at which a drive turns round or stands: friction takes values there that no law of the model may say.
+/// Samples at which a drive reverses or stands still: there friction takes values that no law of the model gives.
 fn reversal_mask(rate: &[f64]) -> Vec<bool> {
     let fastest = rate.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     rate.iter().map(|v| v.abs() < SLOW * fastest).collect()
 }
 
-/// The value that this part of all stays below.
+/// The quantile of some values; 0 without values.
 fn quantile(mut values: Vec<f64>, part: f64) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -1,6 +1,7 @@
-//! Gravity that pulls the other way: a machine that hangs where its model stands, or the sign of `gravity` in the model file.
+//! Detects gravity of the wrong sign: a machine mounted upside down relative to its model, or a wrong sign of
+//! `gravity` in the model file.
 //!
-//! Decision: no second derivation is needed. The columns at standstill are those of gravity, and they change their
+//! Decision: no second derivation is needed. The columns at standstill are those of gravity, which change their
 //! sign.
 
 use modelmill_boundary::message;
@@ -14,10 +15,10 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
 
-/// Relative errors, friction and offsets of the drives taken off, below which nothing is wrong with gravity.
+/// Relative error, with friction and offsets of the drives fitted, below which gravity is accepted.
 const BEARABLE: f64 = 0.01;
 
-/// Says so where gravity the other way explains the forces far better.
+/// A finding if reversed gravity explains the forces far better. `measured` are the forces at the samples, interleaved.
 pub(super) fn reversed_gravity_finding(
     model: &Model,
     data: &RecordingSegment,
@@ -28,18 +29,19 @@ pub(super) fn reversed_gravity_finding(
         return None;
     }
     let error = |regressor| ForceAudit::new(regressor)?.error(measured);
+    // Both fits include friction, inertia and offsets of the drives.
     let before = error(AuditRows::new(model, data, samples)?.regressor)?;
     if before < BEARABLE {
         return None;
     }
     let after = error(AuditRows::with_reversed_gravity(model, data, samples)?)?;
     (after < BETTER * before).then(|| {
-        let says = "gravity seems to pull the other way".to_owned();
+        let says = "gravity seems to point in the opposite direction".to_owned();
         let file = &data.run.file;
         let note = message!(
-            "In {file} {says}: the best fit of the model with friction and offsets of its drives is off by {} as it is, and \
-             would be off by {} then. Check {}, and which way up the machine is mounted; something \
-             that more than balances its weight looks alike.",
+            "In {file} {says}. The best fit of the model with friction and offsets of its drives has an error of {} as it is, and \
+             {} with reversed gravity. Check {}, and how the machine is mounted; a device \
+             that more than balances its weight looks the same.",
             percent(Some(before)),
             percent(Some(after)),
             Remedy::edit("gravity")

@@ -1,5 +1,5 @@
-//! What a model says of a recording before anything is believed: delays between force and motion, columns that are
-//! exchanged or turned round, angles in degrees, gravity that pulls the other way. Everything goes into the notes.
+//! Checks of a recording with the model, before any result is computed: delays between force and motion, exchanged
+//! columns and wrong signs, angles in degrees, reversed gravity. All findings become notes.
 
 mod delay;
 pub(crate) mod events;
@@ -19,38 +19,42 @@ use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
 use delay::ForceDelayAudit;
 
-/// Kinds of suspicions: before one is cleared up, whatever else is found may be part of it.
+/// Kinds of suspicions. Until one is resolved, other findings may be a consequence of it.
 const EXCHANGED: &str = "exchanged_columns";
 const WRONG_SIGN: &str = "wrong_sign";
 const UNITS: &str = "units";
 const GRAVITY: &str = "gravity_direction";
+/// The kinds that are reported before all other findings.
 pub(crate) const SUSPICIONS: [&str; 4] = [EXCHANGED, WRONG_SIGN, UNITS, GRAVITY];
 
-/// Samples that are looked at, spread over the recording; fewer of many drives, but at least [`FEWEST_LOOKED_AT`].
+/// Largest number of samples, spread over the recording; fewer for many drives, but at least [`FEWEST_LOOKED_AT`].
 const LOOKED_AT: usize = 1500;
+/// Largest number of rows, over all drives.
 const ROWS_LOOKED_AT: usize = 12_000;
+/// Smallest number of samples, even for many drives.
 const FEWEST_LOOKED_AT: usize = 300;
-/// Fewest samples of which anything is said.
+/// Recordings with fewer samples are not checked.
 const FEWEST: usize = 100;
-/// Relative errors below this one raise no suspicion of exchanged columns.
+/// Relative errors below this one cause no suspicion of exchanged columns.
 const BEARABLE: f64 = 0.05;
-/// Where a mechanism cannot reach the poses as they are, others must explain forces to this relative error.
+/// If the mechanism cannot reach the poses as recorded, a change must reduce the error to this relative value.
 const CONVINCING: f64 = 0.3;
-/// An exchange must lower the error to this part.
+/// An exchange must reduce the error to this fraction.
 const BETTER: f64 = 0.5;
-/// Errors that are the same but for this part cannot tell one change from another.
+/// Changes whose errors agree within this fraction are indistinguishable.
 const ALIKE: f64 = 0.05;
-/// Errors as small as this one are rounding.
+/// Errors below this one are rounding.
 const EXACT: f64 = 1e-6;
-/// Rows for each base parameter that a change is judged by at least.
+/// Smallest number of rows per base parameter with which a change is judged.
 const ROWS_PER_COLUMN: usize = 4;
-/// Multiplications that trying all changes of the motion may take, some ten seconds of one core: more than 32 bits hold.
+/// Largest number of multiplications for all changes of the motion, some ten seconds of one core; exceeds 32 bits.
 const AFFORDABLE: u64 = 20_000_000_000;
 
-/// Looks at every recording that has forces, and adds what it finds to their notes; the forces of contacts and pushes count no
-/// more where `leave_out_events`.
+/// Checks every recording that has forces and adds the findings to its notes. With `leave_out_events`, forces during
+/// contacts and pushes are excluded.
 pub fn examine(model: &Model, data: &mut [RecordingSegment], leave_out_events: bool) {
     for one in data {
+        // Notes go to the listener at once; suspicions are kept for the diagnosis.
         for AuditFinding { note, fault } in findings(model, one) {
             one.note(model, note);
             one.faults.extend(fault);
@@ -61,14 +65,16 @@ pub fn examine(model: &Model, data: &mut [RecordingSegment], leave_out_events: b
     }
 }
 
-/// What is told of a recording, and the disturbance that the verdict of a diagnosis begins with.
+/// A note on a recording, with the disturbance that a diagnosis reports first, if it is a suspicion.
 struct AuditFinding {
+    /// For the user.
     note: RecordingNote,
+    /// For the diagnosis.
     fault: Option<Disturbance>,
 }
 
 impl AuditFinding {
-    /// A suspicion of a kind in [`SUSPICIONS`], as a clause and as the whole note.
+    /// A suspicion of a kind in [`SUSPICIONS`], as a clause and as the complete note.
     fn suspicion(kind: &str, at: Vec<String>, says: String, file: &str, note: Message) -> Self {
         let fault = Disturbance {
             kind: kind.to_owned(),
@@ -85,6 +91,7 @@ impl AuditFinding {
     }
 }
 
+/// The findings of a recording; only the first kind that is found, since one fault may cause others.
 fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let run = &data.run;
     let n = data.samples();
@@ -92,9 +99,10 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
         return Vec::new();
     };
     let n_drives = forces.len();
+    // Samples are spread evenly over the recording.
     let wanted = (ROWS_LOOKED_AT / n_drives.max(1)).clamp(FEWEST_LOOKED_AT, LOOKED_AT);
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
-    // Poses without answer are reported with their place when the whole recording is evaluated.
+    // Poses without a solution are reported with their place when the complete recording is evaluated.
     let Some(as_it_is) = force_audit(model, data, &samples, &|_| {}) else {
         return motion_findings(model, data, &samples);
     };
@@ -106,15 +114,16 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let late = ForceDelayAudit::from_segment(model, data);
     let with_delay = late.as_ref().and_then(ForceDelayAudit::residual_with_delay);
     let mut notes = Vec::new();
-    // Forces that are late by a good part of a period look like those of another drive.
+    // Forces delayed by a large part of a period resemble those of another drive.
     if error > BEARABLE && with_delay.is_none_or(|left| left > BETTER * error) {
         let drives = model.drives();
         let columns = Remedy::option(OptionName::Columns);
         if let Some((suspect, [before, after])) = as_it_is.find_wiring_fault(&measured)
             && after < BETTER * before
-            // Nominal values know which drive it is.
+            // The check with nominal values identifies the drive.
             && (beside.is_empty() || !matches!(suspect, WiringFault::Reversed(_)))
         {
+            // Of two drives it cannot be known which of them has the wrong sign.
             let (kind, at, says) = match suspect {
                 WiringFault::Swapped(a, b) => (
                     EXCHANGED,
@@ -139,8 +148,8 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
                 ),
             };
             let note = message!(
-                "In {} {says}: the best fit of the model is off by {} as the columns are, and by {} then. Check which column is \
-                 which ({}).",
+                "In {} {says}: the best fit of the model has an error of {} with the columns as they are, and of {} after this \
+                 correction. Check which column is which ({}).",
                 run.file,
                 percent(Some(before)),
                 percent(Some(after)),
@@ -149,11 +158,12 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
             let at = at.into_iter().map(|d| drives[d].clone()).collect();
             notes.push(AuditFinding::suspicion(kind, at, says, &run.file, note));
         }
+        // Exchanged or reversed coordinates would explain the forces as well.
         if notes.is_empty() {
             notes = motion_findings(model, data, &samples);
         }
     }
-    // A change of the motion may look like it.
+    // Reversed gravity is tested after the motion, whose changes may look like it.
     if notes.is_empty() {
         notes.extend(gravity::reversed_gravity_finding(
             model, data, &samples, &measured,
@@ -162,6 +172,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     if notes.is_empty() {
         notes = beside;
     }
+    // A delay is reported only if nothing else is suspicious.
     if notes.is_empty() {
         let late = late.and_then(|late| late.delay_note(model, &run.file));
         notes.extend(late.map(|note| AuditFinding { note, fault: None }));
@@ -169,7 +180,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     notes
 }
 
-/// Signs and units of the forces, held against those that the nominal values give.
+/// Signs and units of the forces, compared with the forces at the nominal values.
 fn nominal_force_findings(
     model: &Model,
     data: &RecordingSegment,
@@ -181,11 +192,13 @@ fn nominal_force_findings(
     let forces = data.run.force.as_deref().unwrap_or(&[]);
     let nominal = DVector::from_column_slice(&model.nominal);
     let n = forces.len();
+    // Rows are interleaved by drive.
     let by_drive = |forces: DVector<f64>| -> Vec<Vec<f64>> {
         let of = |d: usize| forces.iter().skip(d).step_by(n).copied().collect();
         (0..n).map(of).collect()
     };
     let expected = by_drive(regressor * &nominal);
+    // Forces with reversed gravity may explain a wrong sign.
     let upside_down = rows::regressor_with_reversed_gravity(model, data, samples);
     let upside_down = upside_down.map(|rows| by_drive(rows * &nominal));
     let measured: Vec<Vec<f64>> = forces
@@ -197,11 +210,11 @@ fn nominal_force_findings(
     nominal_forces::oddities(mechanism, &measured, &expected, upside_down, &data.run.file)
 }
 
-/// Positions, rates and accelerations, `[order][coordinate][sample]`.
+/// Positions, rates and accelerations, `[order][coordinate][sample]`, SI units.
 type MotionColumns = [Vec<Vec<f64>>; 3];
-/// What could be done to a recording's motion to make sense of it.
+/// A change of a recording's motion that may explain the forces better.
 type MotionChange<'a> = dyn Fn(&mut MotionColumns) + 'a;
-/// Forces at some samples, those of all drives one after the other.
+/// Forces at some samples, interleaved by drive.
 fn interleave_forces(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
     let rows = samples
         .iter()
@@ -209,7 +222,7 @@ fn interleave_forces(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
     DVector::from_iterator(samples.len() * forces.len(), rows)
 }
 
-/// How well the model explains the forces once the motion is changed.
+/// The fit of the model to the forces after a change of the motion; `None` if a pose has no solution.
 fn force_audit(
     model: &Model,
     data: &RecordingSegment,
@@ -220,30 +233,34 @@ fn force_audit(
     ForceAudit::new(ChannelRegressor::new(&regressor, model.drives().len()))
 }
 
-/// Coordinates that are exchanged or turned round, or angles in degrees.
+/// Exchanged coordinates, coordinates with the wrong sign, or angles in degrees.
 fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Vec<AuditFinding> {
     let Some(forces) = data.run.force.as_deref() else {
         return Vec::new();
     };
     let file = &data.run.file;
     let mut hypotheses = hypotheses(model, &data.maps_from_degrees);
+    // Samples are thinned, or exchanges are not tested, if all hypotheses would take too long.
     let thinned = |hypotheses: usize| {
         let rows = (samples.len() * forces.len() * hypotheses) as u64;
         let all = (model.base.len() as u64).pow(2) * rows;
         usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX)
     };
+    // A change is judged with several rows for each base parameter.
     let fewest = (ROWS_PER_COLUMN * model.base.len()).max(1);
     let most = (samples.len() * forces.len() / fewest).max(1);
     if thinned(hypotheses.len()) > most {
-        // Exchanges come last, and are many.
+        // Exchanges are last in the list and most numerous.
         let turned = hypotheses.iter().rposition(|one| one.kind == WRONG_SIGN);
         hypotheses.truncate(turned.map_or(0, |last| last + 1));
     }
     let thinned = thinned(hypotheses.len()).min(most);
     let samples: Vec<usize> = samples.iter().copied().step_by(thinned).collect();
     let measured = interleave_forces(forces, &samples);
+    // The error without a change is the reference; it does not exist if poses cannot be reached.
     let now = force_audit(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
     let limit = now.map_or(CONVINCING, |error| BETTER * error);
+    // Only changes that reduce the error clearly are kept, the best first.
     let mut tried: Vec<(&ColumnHypothesis, f64)> = hypotheses
         .iter()
         .filter_map(|one| {
@@ -256,12 +273,14 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
     let Some((first, error)) = tried.first() else {
         return Vec::new();
     };
+    // Several coordinates may explain the forces equally well by their sign.
     let alike = tried
         .iter()
         .filter(|(one, other)| one.kind == WRONG_SIGN && *other <= (1.0 + ALIKE) * error + EXACT);
     let turned: Vec<&str> = alike
         .flat_map(|(one, _)| one.at.iter().map(String::as_str))
         .collect();
+    // If several signs explain the same, all coordinates are named.
     let (at, says) = if first.kind == WRONG_SIGN && turned.len() > 1 {
         let says = format!(
             "one of the coordinates `{}` seems to have the wrong sign",
@@ -272,18 +291,19 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         (first.at.clone(), first.says.clone())
     };
     let as_it_is = match now {
-        Some(now) => format!("is off by {}", percent(Some(now))),
-        None => "does not exist, for the mechanism cannot reach such poses".to_owned(),
+        Some(now) => format!("an error of {}", percent(Some(now))),
+        None => "no solution, since the mechanism cannot reach such poses".to_owned(),
     };
     let note = message!(
-        "In {file} {says}: {}. The best fit of the model {as_it_is} as the columns are, and would be off by {} then.",
+        "In {file} {says}: {}. With the columns as they are, the best fit of the model has {as_it_is}; after this correction its \
+         error is {}.",
         first.advice,
         percent(Some(*error))
     );
     vec![AuditFinding::suspicion(first.kind, at, says, file, note)]
 }
 
-/// What may have happened to the columns of a motion.
+/// A possible mistake in the columns of a motion.
 struct ColumnHypothesis {
     /// One of [`SUSPICIONS`].
     kind: &'static str,
@@ -293,14 +313,16 @@ struct ColumnHypothesis {
     says: String,
     /// What to do about it.
     advice: Message,
+    /// What it does to the motion.
     change: Box<MotionChange<'static>>,
 }
 
-/// Angles in degrees, coordinates with the wrong sign, and pairs that are exchanged.
+/// All hypotheses: angles in degrees, coordinates with the wrong sign, and exchanged pairs, in this order.
 fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnHypothesis> {
     let columns = Remedy::option(OptionName::Columns);
     let motions = model.motions();
     let mut hypotheses = Vec::new();
+    // A factor changes positions and derivatives alike.
     let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<MotionChange<'static>> {
         Box::new(move |states| {
             for order in states.iter_mut() {
@@ -312,6 +334,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
             }
         })
     };
+    // All angles together, since a recorder uses one unit.
     let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
     if !angles.is_empty() {
         hypotheses.push(ColumnHypothesis {
@@ -319,7 +342,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
             at: angles.iter().map(|i| motions[*i].0.clone()).collect(),
             says: "the angles seem to be in degrees".to_owned(),
             advice: message!(
-                "they must be in rad, so say {}",
+                "they must be in rad; use {}",
                 Remedy::options(maps_from_degrees.to_vec())
             ),
             change: scaled(angles, 1.0_f64.to_radians()),
@@ -330,10 +353,11 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
             kind: WRONG_SIGN,
             at: vec![name.clone()],
             says: format!("the coordinate `{name}` seems to have the wrong sign"),
-            advice: message!("check which way it counts ({})", columns),
+            advice: message!("check its positive direction ({})", columns),
             change: scaled(vec![a], -1.0),
         });
     }
+    // Only coordinates of one kind can be exchanged.
     for a in 0..motions.len() {
         for b in a + 1..motions.len() {
             if motions[a].1 == motions[b].1 {
@@ -357,7 +381,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
     hypotheses
 }
 
-/// The regressor at some samples, with the states changed.
+/// The regressor at some samples with changed states; `None` if a pose has no solution.
 fn regressor(
     model: &Model,
     data: &RecordingSegment,
@@ -369,6 +393,7 @@ fn regressor(
         columns.iter().map(pick).collect()
     };
     let run = &data.run;
+    // The change is applied to the selected samples only.
     let mut states = [&run.q, &run.qd, &run.qdd].map(|columns| pick(columns));
     change(&mut states);
     let load = pick(run.force.as_deref().unwrap_or(&[]));

@@ -1,6 +1,6 @@
-//! What nominal values say of the sign and the size of measured forces: forces along a recording go in, drives whose
-//! forces point the other way or are in another unit come out, with the option that mends it. A fit alone does not show
-//! either, since parameters may take any sign and size.
+//! Checks the sign and the size of measured forces with nominal values. Forces along a recording go in, drives with
+//! forces of the opposite sign or in another unit come out, with the option that corrects them. A fit alone cannot
+//! show this, since its parameters may have any sign and size.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
@@ -9,47 +9,51 @@ use modelmill_spec::{Mechanism, ModelDrive};
 
 use super::{AuditFinding, UNITS, WRONG_SIGN};
 
-/// Below this correlation with the nominal forces nothing is said: friction and wrong nominal values may be behind it.
+/// Below this correlation with the nominal forces nothing is reported: friction and wrong nominal values may be the
+/// cause.
 const CLEAR: f64 = 0.8;
-/// Factors between units of force are powers of 1000; nominal values may be off by this factor.
+/// Units of force differ by powers of 1000; nominal values may be wrong by this factor.
 const TOLERANCE: f64 = 4.0;
 
-/// Forces that are so many times as small may be those of motors before their gears; nearer, nominal values may be wrong.
+/// Ratios of nominal to measured force that may be those of a gear: motor torques before the gear. At smaller ratios
+/// nominal values may be wrong.
 const GEARS: std::ops::Range<f64> = 12.0..1000.0 / TOLERANCE;
 
-/// How a column of forces may have been misread.
+/// A mistake in a column of forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ForceMisreading {
-    /// It points the other way.
+    /// It has the opposite sign.
     Turned,
-    /// Measured in thousands of the unit.
+    /// It is in thousands of the unit.
     TooSmall,
-    /// Measured in thousandths of the unit.
+    /// It is in thousandths of the unit.
     TooLarge,
 }
 
-/// What is odd about the force of a drive.
+/// A suspicion about the force of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum ForceOddity {
-    /// Sign or unit is another one.
+    /// Sign or unit is wrong.
     Misread(ForceMisreading),
-    /// As small as that of a motor before its gear, or as its current, by this factor.
+    /// It is smaller by this factor, as a motor torque before its gear or a motor current is.
     BeforeGear(f64),
 }
 
-/// How much two forces resemble each other, -1 to 1, and by how much the first is larger.
+/// The correlation of two forces, -1 to 1, and the ratio of their norms.
 fn correlation_and_ratio(one: &[f64], other: &[f64]) -> (f64, f64) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let sizes = [one, other].map(|force| dot(force, force).sqrt());
     (dot(one, other) / (sizes[0] * sizes[1]), sizes[0] / sizes[1])
 }
 
-/// How a measured force is related to the nominal one.
+/// The suspicion about a measured force, from its correlation with the nominal one; `None` if they agree or are
+/// unrelated.
 fn oddity(measured: &[f64], nominal: &[f64]) -> Option<ForceOddity> {
     let (correlation, ratio) = correlation_and_ratio(measured, nominal);
     if !correlation.is_finite() || correlation.abs() < CLEAR {
         return None;
     }
+    // Units are tested first: their ratios are far from those of gears and wrong nominal values.
     let about = |factor: f64| (factor / TOLERANCE..factor * TOLERANCE).contains(&ratio);
     if about(1e-3) {
         Some(ForceOddity::Misread(ForceMisreading::TooSmall))
@@ -64,8 +68,8 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<ForceOddity> {
     }
 }
 
-/// What is told of drives whose measured forces are not those of the nominal values by their sign or unit; forces are
-/// `[drive][sample]`, `upside_down` those of the nominal values if gravity pulled the other way.
+/// Findings about drives whose measured forces contradict the nominal values in sign or unit. Forces are
+/// `[drive][sample]`; `upside_down` are those at the nominal values with reversed gravity.
 pub(crate) fn oddities(
     mechanism: &Mechanism,
     measured: &[Vec<f64>],
@@ -77,6 +81,7 @@ pub(crate) fn oddities(
         (mechanism.drives.iter().zip(measured).zip(nominal))
             .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
             .collect();
+    // Drives with the same mistake are reported together.
     let mut told: Vec<AuditFinding> = [
         ForceMisreading::Turned,
         ForceMisreading::TooSmall,
@@ -94,6 +99,7 @@ pub(crate) fn oddities(
         (!drives.is_empty()).then(|| misreading_finding(mechanism, &drives, which, may_hang, file))
     })
     .collect();
+    // Gear ratios cannot be corrected by a unit, and are reported separately.
     let before_gears = found.iter().filter_map(|(drive, oddity)| match oddity {
         ForceOddity::BeforeGear(factor) => Some((*drive, *factor)),
         ForceOddity::Misread(_) => None,
@@ -106,7 +112,7 @@ pub(crate) fn oddities(
     told
 }
 
-/// Whether forces resemble those of all drives that resemble them at all, by their sign.
+/// Whether forces have the sign of the measured ones at all drives with a clear correlation.
 fn is_sign_explained(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
     let pairs = measured.iter().zip(forces);
     let alike = pairs.map(|(measured, forces)| correlation_and_ratio(measured, forces).0);
@@ -114,7 +120,7 @@ fn is_sign_explained(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
     !clear.is_empty() && clear.iter().all(|alike| *alike > 0.0)
 }
 
-/// Asks what the columns of drives are whose forces are so many times as small as the nominal ones.
+/// The note on drives whose forces are smaller than the nominal ones by a factor typical of a gear.
 fn column_query_text(drives: &[(&ModelDrive, f64)], file: &str) -> String {
     let each: Vec<String> = drives
         .iter()
@@ -125,16 +131,16 @@ fn column_query_text(drives: &[(&ModelDrive, f64)], file: &str) -> String {
         .map(|(drive, factor)| format!("`{} = {{ ratio = {factor:.0} }}`", drive.name))
         .collect();
     format!(
-        "Beside what the nominal values give, forces in {file} are smaller by what a gear makes: {}. If a column is the \
-         motor's torque before its gear, say so under `[recording.torque]` of the model file with the true ratio, as in \
-         {}; if it is a current, with its `constant` in N m per ampere (or N per ampere) too. Else all base parameters come \
-         out so many times too small.",
+        "Compared with the nominal values, forces in {file} are smaller by a factor typical of a gear: {}. If a column is \
+         the motor's torque before its gear, declare it under `[recording.torque]` of the model file with the true ratio, as \
+         in {}. If it is a current, also give its `constant` in N m per ampere (or N per ampere). Otherwise all base \
+         parameters are estimated too small by this factor.",
         each.join(", "),
         entries.join(", "),
     )
 }
 
-/// Forces of drives that were misread; gravity the other way may be behind it.
+/// The finding about forces with a mistake; `may_hang` states that reversed gravity may be the cause.
 fn misreading_finding(
     mechanism: &Mechanism,
     drives: &[&ModelDrive],
@@ -147,6 +153,7 @@ fn misreading_finding(
         [_] => ("force", "is", "it is"),
         _ => ("forces", "are", "they are"),
     };
+    // The options that correct the columns.
     let maps = drives.iter().map(|drive| {
         let name = &drive.name;
         let column = match which {
@@ -160,24 +167,27 @@ fn misreading_finding(
         OptionSetting::new(OptionName::Columns, column)
     });
     let (kind, what, if_so) = match which {
-        ForceMisreading::Turned => (WRONG_SIGN, "of the opposite sign", "counted the other way"),
+        ForceMisreading::Turned => (
+            WRONG_SIGN,
+            "of the opposite sign",
+            "measured in the opposite direction",
+        ),
         ForceMisreading::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
         ForceMisreading::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
     let names = names.join(", ");
     let (or, besides) = if may_hang {
         let besides = message!(
-            " Gravity that pulls the other way would turn them, too: check {}, and which way up the machine is mounted, first.",
+            " Reversed gravity would also change their sign: first check {}, and how the machine is mounted.",
             Remedy::edit("gravity")
         );
-        (", or gravity pulls the other way", besides)
+        (", or gravity is reversed", besides)
     } else {
         ("", Message::new())
     };
-    let says =
-        format!("the {forces} of {names} {are} {what} beside what the nominal values give{or}");
+    let says = format!("the {forces} of {names} {are} {what} compared with the nominal values{or}");
     let note = message!(
-        "Beside what the nominal values give, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, say {}.{}",
+        "Compared with the nominal values, the {forces} of {names} in {file} {are} {what}; if {they_are} {if_so}, use {}.{}",
         Remedy::options(maps),
         besides
     );

@@ -1,5 +1,5 @@
-//! Rows of a model at some samples of a stretch, with what drives do besides: friction, inertia and an offset of each, since
-//! where a model lacks these their force would pass for something else.
+//! Rows of a model at some samples of a segment, with further columns for each drive: friction, inertia and an
+//! offset. If a model lacks these, their force would be attributed to something else.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::ChannelRegressor;
@@ -8,13 +8,13 @@ use nalgebra::DMatrix;
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 
-/// Columns of a drive besides the model's: rate, its sign, acceleration, an offset, and friction that grows with the square of the
-/// rate or differs by direction.
+/// Number of further columns of a drive: rate, its sign, acceleration, an offset, friction with the square of the
+/// rate, and friction that differs by direction.
 const MORE: usize = 6;
-/// Differences reach over this part of a period of the highest frequency at which forces follow the motion.
+/// Differences are taken over this fraction of a period of the highest frequency at which forces follow the motion.
 const REACH: f64 = 1.0 / 16.0;
 
-/// A model at some samples.
+/// The rows of a model at some samples.
 pub(super) struct AuditRows {
     /// Times of the samples, s.
     pub(super) time: Vec<f64>,
@@ -25,7 +25,7 @@ pub(super) struct AuditRows {
 }
 
 impl AuditRows {
-    /// `None` where the mechanism has no answer at one of the samples.
+    /// The rows at some samples; `None` if a pose has no solution, or a value is not finite.
     pub(super) fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
         let around = DriveStencil::new(model, data, samples)?;
         let mut rows = regressor(model, data, samples)?;
@@ -44,7 +44,7 @@ impl AuditRows {
         })
     }
 
-    /// The regressor and the further columns if gravity pulled the other way.
+    /// The regressor and the further columns with reversed gravity.
     pub(super) fn with_reversed_gravity(
         model: &Model,
         data: &RecordingSegment,
@@ -57,7 +57,7 @@ impl AuditRows {
         is_finite.then(|| ChannelRegressor::new(&rows, around.rates[1].len()))
     }
 
-    /// The slope in time of the regressor and the further columns, per s.
+    /// The time derivative of the regressor and the further columns, per s.
     pub(super) fn slope(
         model: &Model,
         data: &RecordingSegment,
@@ -65,6 +65,7 @@ impl AuditRows {
     ) -> Option<ChannelRegressor> {
         let around = DriveStencil::new(model, data, samples)?;
         let n = around.rates[1].len();
+        // The regressor is differentiated by differences, the further columns by their own formulas.
         let [earlier, _, later] = &around.samples;
         let mut slope = regressor(model, data, later)? - regressor(model, data, earlier)?;
         for mut column in slope.column_iter_mut() {
@@ -78,22 +79,28 @@ impl AuditRows {
     }
 }
 
-/// What the drives do at samples, at those before and at those after them.
+/// Motion of the drives at samples, and at the samples before and after them, for differences.
 struct DriveStencil {
+    /// Indices of the samples before, at and after.
     samples: [Vec<usize>; 3],
+    /// Their times, s.
     times: [Vec<f64>; 3],
-    /// At the samples themselves.
+    /// Positions of the drives at the samples, rad or m.
     positions: Vec<Vec<f64>>,
+    /// Rates of the drives before, at and after, rad/s or m/s.
     rates: [Vec<Vec<f64>>; 3],
 }
 
-/// Further columns of a drive at a sample, and their slopes in time.
+/// Further columns of a drive at a sample, and their time derivatives.
 struct ExtraDriveColumns {
+    /// The columns, in the order of [`MORE`].
     values: [f64; MORE],
+    /// Their time derivatives, per s.
     slopes: [f64; MORE],
 }
 
 impl DriveStencil {
+    /// Evaluates the drives; `None` if a pose has no solution.
     fn new(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<Self> {
         let last = data.samples().checked_sub(1)?;
         let reach = reach(data);
@@ -122,16 +129,18 @@ impl DriveStencil {
         })
     }
 
-    /// The time from before a sample to after it, s.
+    /// The time between the samples before and after sample `i`, s.
     fn span(&self, i: usize) -> f64 {
         self.times[2][i] - self.times[0][i]
     }
 
+    /// The further columns of drive `d` at sample `i`, by differences of its rate.
     fn extra_columns(&self, d: usize, i: usize) -> ExtraDriveColumns {
         let [t_before, t, t_after] = self.times.each_ref().map(|times| times[i]);
         let [v_before, v, v_after] = self.rates.each_ref().map(|rates| rates[d][i]);
         let step = self.span(i);
         let acceleration = (v_after - v_before) / step;
+        // At the ends of a recording one of the neighbours is the sample itself.
         let slopes =
             [(v - v_before, t - t_before), (v_after - v, t_after - t)].map(|(change, step)| {
                 if step > 0.0 {
@@ -155,7 +164,7 @@ impl DriveStencil {
         }
     }
 
-    /// Puts what is chosen of the further columns behind those of the model.
+    /// Appends the further columns of all drives, or their derivatives as `chosen` selects, behind those of the model.
     fn add_extra_columns(
         &self,
         rows: &mut DMatrix<f64>,
@@ -175,7 +184,7 @@ impl DriveStencil {
     }
 }
 
-/// Samples to either side over which differences are taken.
+/// Number of samples to either side over which differences are taken.
 fn reach(data: &RecordingSegment) -> usize {
     let time = &data.run.time;
     let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
@@ -189,21 +198,22 @@ fn reach(data: &RecordingSegment) -> usize {
     reach.clamp(1, time.len().max(2) / 2)
 }
 
-/// The regressor at some samples, rows interleaved.
+/// The regressor at some samples, rows interleaved by drive; `None` if a pose has no solution.
 fn regressor(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<DMatrix<f64>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let found = SampledStates::new(data, samples).with_states(|states| evaluator.regressor(states));
     found.ok()
 }
 
-/// The regressor if gravity pulled the other way: what columns are at rest is gravity's, or an effect's of which a fit knows no
-/// sign.
+/// The regressor with reversed gravity. Columns at standstill are those of gravity, or of an effect whose sign a fit
+/// does not fix.
 pub(super) fn regressor_with_reversed_gravity(
     model: &Model,
     data: &RecordingSegment,
     samples: &[usize],
 ) -> Option<DMatrix<f64>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
+    // f(-g) = f(g) - 2 f(g) at standstill, since only gravity acts there.
     let at_rest = SampledStates::new(data, samples).at_standstill();
     let at_rest = at_rest
         .with_states(|states| evaluator.regressor(states))
@@ -211,13 +221,16 @@ pub(super) fn regressor_with_reversed_gravity(
     Some(regressor(model, data, samples)? - 2.0 * at_rest)
 }
 
-/// States at some samples.
+/// States at some samples, with the load.
 struct SampledStates {
+    /// Positions, rates and accelerations, `[order][coordinate][sample]`.
     motion: [Vec<Vec<f64>>; 3],
+    /// Measured forces, `[drive][sample]`.
     load: Vec<Vec<f64>>,
 }
 
 impl SampledStates {
+    /// The states of a segment at some samples.
     fn new(data: &RecordingSegment, samples: &[usize]) -> Self {
         Self {
             motion: [&data.run.q, &data.run.qd, &data.run.qdd]
@@ -226,7 +239,7 @@ impl SampledStates {
         }
     }
 
-    /// The same poses at rest.
+    /// The same poses at standstill.
     fn at_standstill(mut self) -> Self {
         let [_, rates, accelerations] = &mut self.motion;
         for column in rates.iter_mut().chain(accelerations) {
@@ -235,6 +248,7 @@ impl SampledStates {
         self
     }
 
+    /// Calls a function with the states.
     fn with_states<R>(&self, evaluate: impl FnOnce(&MotionStates<'_>) -> R) -> R {
         evaluate(&MotionStates {
             q: slices(&self.motion[0]),
@@ -245,11 +259,12 @@ impl SampledStates {
     }
 }
 
+/// Columns as slices.
 fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()
 }
 
-/// Columns at some samples.
+/// The values of columns at some samples.
 pub(super) fn select_samples(columns: &[Vec<f64>], samples: &[usize]) -> Vec<Vec<f64>> {
     let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
     columns.iter().map(pick).collect()

@@ -24,6 +24,7 @@ pub struct CompletedModelFile {
 
 /// The effects found, as entries whose nominal values are the estimates.
 pub(crate) fn entries(model: &Model, answer: &DiagnosisSolution) -> Vec<NewEffect> {
+    // An effect that has no place in a model file is no entry.
     let spots = candidate_places(&model.derivation.mechanism);
     let found = answer.diagnosis.effects.iter();
     let entries = found.filter_map(|found| {
@@ -46,11 +47,13 @@ pub(crate) fn entries(model: &Model, answer: &DiagnosisSolution) -> Vec<NewEffec
     made
 }
 
-/// Splits entries of one kind that share places, such as friction at both drives and more at one, into entries that do not: a model
-/// file has a kind once at a place. At shared places the parameters add up, since the columns are the same.
+/// Splits entries of one kind that share places, such as friction at both drives and more at one, into entries
+/// that do not: a model file has a kind once at a place. At shared places the parameters add up, since the
+/// columns are the same.
 fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     let mut made: Vec<NewEffect> = Vec::new();
     for entry in entries {
+        // Constants must be equal, since the columns of other constants differ.
         let meets = |one: &NewEffect| {
             one.kind == entry.kind
                 && one.constants == entry.constants
@@ -61,6 +64,7 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
             continue;
         };
         let other = made.remove(k);
+        // The places of both entries, without repetition.
         let more = entry.at.iter().filter(|p| !other.at.contains(p));
         let places: Vec<String> = other.at.iter().chain(more).cloned().collect();
         let of = |wanted: &dyn Fn(bool, bool) -> bool, effect: &NewEffect| NewEffect {
@@ -82,7 +86,8 @@ fn split_shared_places(entries: Vec<NewEffect>) -> Vec<NewEffect> {
     made
 }
 
-/// An effect as an entry. An estimate may belong to a parameter, to a constant that enters linearly, or to the product of both.
+/// An effect as an entry. An estimate may belong to a parameter, to a constant that enters linearly, or to the
+/// product of both.
 fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution) -> NewEffect {
     let parameters = &answer.problem.candidates[found.candidate].parameters;
     let mut effect = NewEffect {
@@ -91,6 +96,7 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
         constants: found.constants.clone(),
         ..NewEffect::default()
     };
+    // Stage 1: each estimate becomes a parameter or a constant of the entry.
     let estimates = parameters.iter().zip(&found.estimates);
     for (parameter, value) in estimates.clone() {
         let symbol = parameter.symbol.as_str();
@@ -116,6 +122,7 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
             });
         }
     }
+    // Stage 2: constants of the search get the same number of digits.
     for (_, value) in &mut effect.constants {
         *value = round_significant(*value);
     }
@@ -129,6 +136,7 @@ fn sum(one: &NewEffect, other: &NewEffect) -> NewEffect {
         let known = both.parameters.iter_mut().find(|p| p.symbol == more.symbol);
         match known {
             Some(p) => {
+                // Parameters of equal columns add up.
                 p.nominal = match (p.nominal, more.nominal) {
                     (Some(a), Some(b)) => Some(round_significant(a + b)),
                     (a, b) => a.or(b),
@@ -147,9 +155,12 @@ pub(crate) fn round_significant(value: f64) -> f64 {
 }
 
 /// Adds entries to the text of a model's file, one after the other.
+///
+/// Fails when an entry contradicts the file, or when there is none.
 pub(crate) fn add_entries(model: &Model, effects: &[NewEffect]) -> Outcome<CompletedModelFile> {
     let mut text = model.text().to_owned();
     let mut last = None;
+    // Each edit starts from the text of the previous one.
     for effect in effects {
         let edited = model.host().edit(&model.path, &text, effect)?;
         text = edited.text;

@@ -1,5 +1,5 @@
-//! All candidates: every kind of the library at every possible place, as entries that `add` would write. They are derived together in
-//! three variants of the model, which give their columns.
+//! All candidates: every kind of the library at every possible place, as entries that `add` would write. They
+//! are derived together in three variants of the model, which give their columns.
 //!
 //! Decision: a candidate is the entry that `add` would write, and its columns come from the derivation of that
 //! entry. So there is no second definition of an effect, and effect kinds of a user's own library are tried like
@@ -95,6 +95,8 @@ pub(crate) enum EvaluationFrequency {
 }
 
 /// Derives all candidates of a model.
+///
+/// Fails when the derivation of a candidate fails.
 pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
     let loaded = &model.loaded;
     let mechanism = &loaded.mechanism;
@@ -179,6 +181,7 @@ fn has_effect(mechanism: &Mechanism, kind: &EffectKind, spots: &[&CandidatePlace
         };
         spots.iter().all(has)
     };
+    // An effect counts as present only if it acts at all of the places.
     let mut effects = mechanism.effects.iter();
     effects.any(|effect| effect.kind == kind.name && holds(effect))
 }
@@ -191,6 +194,7 @@ pub(crate) fn single_candidate(
     number: usize,
     given: &[(String, f64)],
 ) -> SingleCandidate {
+    // Constants with a value are not searched for.
     let is_open = |symbol: &str| given.iter().all(|(known, _)| known != symbol);
     let open = kind.constants.iter().filter(|c| is_open(&c.symbol));
     let searched = open.filter_map(|c| {
@@ -200,6 +204,7 @@ pub(crate) fn single_candidate(
     let constants: Vec<_> = searched.collect();
     let is_range = |c: &(String, String, ConstantSearch)| c.2 != ConstantSearch::Linear;
     SingleCandidate {
+        // The most expensive kind of evaluation that an effect needs decides.
         sort: if is_load_dependent(kind) {
             EvaluationFrequency::LoadDependent
         } else if constants.iter().any(is_range) {
@@ -245,12 +250,14 @@ impl CandidateVariant {
     ) {
         self.singles.push(number);
         let place = single.spots[0].place;
+        // Mechanics have only those parameters that act at the place.
         let at_place = (kind.mechanics).and_then(|one| one.parameters_at(mechanism, place));
         let has = |symbol: &str| {
             at_place
                 .as_ref()
                 .is_none_or(|those| those.contains(&symbol))
         };
+        // Names are unique by the number of the candidate.
         let symbols = kind.parameters.iter().map(|p| &p.symbol);
         let searched = (single.constants.iter())
             .map(|(symbol, name, _)| (symbol.clone(), ConstantValue::Named(name.clone())));
@@ -265,6 +272,7 @@ impl CandidateVariant {
                 .collect(),
             constants: searched.chain(given).collect(),
         });
+        // Searched constants start at 1; their value is set for each evaluation.
         for (symbol, name, _) in &single.constants {
             let constant = kind.constants.iter().find(|c| c.symbol == *symbol);
             let carries = single.spots[0].carries;
@@ -276,6 +284,8 @@ impl CandidateVariant {
     }
 
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
+    ///
+    /// Fails when the file rejects an effect, or when the derivation fails.
     pub(crate) fn derive(
         self,
         model: &Model,
@@ -286,6 +296,7 @@ impl CandidateVariant {
             .loaded
             .with_additions(&self.constants, &self.effects)?;
         let mut wanted = Vec::new();
+        // The derivation numbers parameters anew, so that their indices are stored here.
         for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
             let terms = effect.terms.iter();
             singles[*number].parameters = terms
@@ -293,6 +304,7 @@ impl CandidateVariant {
                 .collect();
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
+        // Only columns of the candidates are derived; those of the model exist already.
         let is_wanted = |product: &ParameterMonomial| {
             product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p))
         };
@@ -306,6 +318,8 @@ impl CandidateVariant {
 }
 
 /// The base columns of a model as functions of a tilt of its base.
+///
+/// Fails when the derivation fails.
 pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
     let names = ["tx", "ty", "tz"].map(|t| (t.to_owned(), format!("candidate_{t}")));
     let constants = names
@@ -326,6 +340,7 @@ pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
         .iter()
         .map(|k| &reduction.products[*k])
         .collect();
+    // The tilt changes gravity in all columns of the base.
     let is_base = |product: &ParameterMonomial| base.contains(&product);
     modelmill_codegen::derive_columns(&variant, &is_base)
         .map_err(|error| Error::derivation(&model.path, error))
@@ -342,8 +357,8 @@ fn named_constant(name: &str, value: f64, unit: &str) -> ModelConstant {
     }
 }
 
-/// Values that are tried for the constant of a candidate, for a largest rate (per s) and a travel of its place; one value without such a
-/// constant.
+/// Values that are tried for the constant of a candidate, for a largest rate (per s) and a travel of its place;
+/// one value without such a constant.
 pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f64> {
     for (_, _, search) in &single.constants {
         let ConstantSearch::Range { from, to, of } = *search else {
@@ -353,6 +368,7 @@ pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f6
             let at = |k: usize| low + (high - low) * k as f64 / (count - 1) as f64;
             (0..count).map(at).collect()
         };
+        // A range may be relative to the motion of the place.
         let scale = match of {
             Scale::Rate => rate,
             Scale::Travel => travel,
@@ -364,7 +380,8 @@ pub(crate) fn grid(single: &SingleCandidate, [rate, travel]: [f64; 2]) -> Vec<f6
         return match of {
             // The grid is even in the number of waves per travel, since that is what distinguishes them.
             Scale::Travel if from > 0.0 => {
-                // Neighbours differ by less than 0.4 waves over the travel, so that no wavelength is missed between them.
+                // Neighbours differ by less than 0.4 waves over the travel, so that no wavelength is missed
+                // between them.
                 let (few, many) = (1.0 / to, 1.0 / from);
                 let count = (2..WAVES).find(|n| (many - few) / (*n as f64) < 0.4);
                 let waves = evenly(count.unwrap_or(WAVES), few, many);

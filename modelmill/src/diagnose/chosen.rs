@@ -1,5 +1,5 @@
-//! An effect that the user names, such as `coulomb_friction@motor:Fc=25.9`: it is derived like a candidate. Output are its columns
-//! along recordings.
+//! An effect that the user names, such as `coulomb_friction@motor:Fc=25.9`: it is derived like a candidate.
+//! Output are its columns along recordings.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -34,12 +34,21 @@ impl NamedEffect {
     /// Reads `KIND@PLACE,PLACE:NAME=VALUE:NAME=VALUE`, values in SI units.
     ///
     /// Fails with a message that gives the expected form.
+    ///
+    /// ```
+    /// use modelmill::diagnose::NamedEffect;
+    ///
+    /// let effect = NamedEffect::parse("coulomb_friction@motor:Fc=25.9").unwrap();
+    /// assert_eq!(effect.effect.kind, "coulomb_friction");
+    /// assert_eq!(effect.values, [("Fc".to_owned(), 25.9)]);
+    /// ```
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
             "expected KIND@PLACE, such as coulomb_friction@motor. Write several places with commas, and values after colons: \
              coulomb_friction@motor:Fc=25.9"
                 .to_owned()
         };
+        // Kind and places come before the first colon, values after it.
         let mut parts = text.split(':');
         let (kind, places) = parts
             .next()
@@ -119,6 +128,7 @@ pub(crate) fn derive_effect(
         )));
     }
     let all = candidate_places(mechanism);
+    // Stage 1: find the places by their names.
     let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
         // The second place of a kind is only an argument of its expression; the effect does not act there.
         let moves = |one: &&CandidatePlace| {
@@ -130,6 +140,7 @@ pub(crate) fn derive_effect(
         }
     });
     let places: Vec<CandidatePlace> = of_kind.collect::<Outcome<_>>()?;
+    // Stage 2: one entry, or one for each place, in the variant that its evaluation needs.
     let mut singles = Vec::new();
     let mut variants: [CandidateVariant; 3] = Default::default();
     let mut tilt = None;
@@ -157,6 +168,7 @@ pub(crate) fn derive_effect(
             singles: (0..singles.len()).collect(),
         });
     }
+    // Stage 3: derive the variants; those without effects are empty.
     let own = mechanism.effects.len();
     let [known, searched, carried] = variants;
     Ok(ChosenEffect {
@@ -177,6 +189,7 @@ pub(crate) fn derive_effect(
 
 /// Fails for what `add` would refuse: an unknown kind, place or symbol, or an effect that the model has.
 fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
+    // The same edit that `add` would make detects all faults.
     let kinds = &model.loaded.kinds;
     let mut effect = NewEffect {
         kind: named.effect.kind.clone(),
@@ -216,12 +229,16 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
 }
 
 /// The place of a kind by its name.
+///
+/// Fails when the kind has no effect at the place; the message names the drive if the name is that of its
+/// joint.
 fn find_place(
     mechanism: &Mechanism,
     kind: &EffectKind,
     all: &[CandidatePlace],
     name: &str,
 ) -> Outcome<CandidatePlace> {
+    // The kind must be able to act at the place.
     let suits = |spot: &&CandidatePlace| spot.name == name && kind.on.contains(&spot.sort);
     if let Some(spot) = all.iter().find(suits) {
         return Ok(spot.clone());
@@ -244,8 +261,10 @@ fn find_place(
     )))
 }
 
-/// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter linearly, such as the neutral
-/// position of a spring, are always estimated with the parameters.
+/// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter
+/// linearly, such as the neutral position of a spring, are always estimated with the parameters.
+///
+/// Fails when a constant has neither a value nor a default.
 fn fixed_constants(
     kind: &EffectKind,
     named: &NamedEffect,
@@ -260,6 +279,7 @@ fn fixed_constants(
             .values
             .iter()
             .find(|(symbol, _)| *symbol == constant.symbol);
+        // Defaults of the library are texts, which may be expressions.
         let usual = constant
             .value
             .as_ref()
@@ -285,14 +305,17 @@ fn fixed_constants(
 }
 
 impl ChosenEffect {
-    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None` if all columns are zero.
-    /// `load` is the force that the drives transmit, N or N m.
+    /// The effect along recordings, with its columns for each value of a constant that is searched for; `None`
+    /// if all columns are zero. `load` is the force that the drives transmit, N or N m.
+    ///
+    /// Fails when the effect has no finite value at some samples, or a pose has no solution.
     pub(crate) fn candidate(
         &self,
         model: &Model,
         all: &SegmentList<'_>,
         load: &ForceColumn,
     ) -> Outcome<Option<(CandidateEffect, Vec<ColumnChoice>)>> {
+        // There is a single candidate, the chosen effect.
         let mut made = candidate_columns(&self.candidates, model, all)?;
         let grids = std::mem::take(&mut made.grids);
         if let Some(effect) = made.undefined.first() {
@@ -306,6 +329,7 @@ impl ChosenEffect {
         let Some(candidate) = made.candidates.into_iter().next() else {
             return Ok(None);
         };
+        // Effects without searched constants have one choice.
         let only = |columns: Vec<ForceColumn>| {
             vec![ColumnChoice {
                 constants: Vec::new(),
@@ -322,7 +346,7 @@ impl ChosenEffect {
                     .next()
                     .map_or_else(Vec::new, |(_, choices)| choices)
             }
-            // A tilt has one column for each axis: the change of all base_columns columns times their nominal values.
+            // A tilt has one column for each axis: the change of all base columns times their nominal values.
             ColumnSource::Tilt(tilt) => {
                 let level = vec![0.0; tilt.axes.len()];
                 let sum = |direction: [f64; 3]| {
@@ -350,6 +374,8 @@ impl ChosenEffect {
 }
 
 /// Columns of the base parameters to estimate, the load of the nominal bodies, and the force of the known parameters.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn base_columns(
     model: &Model,
     all: &SegmentList<'_>,
@@ -359,6 +385,7 @@ pub(crate) fn base_columns(
     // The load is the force of all bodies; the known force is subtracted before a fit.
     let (mut load, mut known) = (none.clone(), none);
     let mut free = Vec::new();
+    // Bodies make the load; effects such as friction do not.
     for (k, column) in every.into_iter().enumerate() {
         if !model.is_effect(k) {
             load.add(model.nominal[k], &column);
@@ -370,6 +397,7 @@ pub(crate) fn base_columns(
         }
     }
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
+    // Drives without load have zeros, so that load-dependent effects can be evaluated.
     for channel in &mut load.0 {
         channel.get_or_insert_with(|| vec![0.0; samples]);
     }

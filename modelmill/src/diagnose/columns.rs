@@ -25,17 +25,21 @@ use crate::regressors::{SegmentList, regressor_of};
 const CONSTANT: &str = "force_offset";
 
 /// Candidates with their columns, and the origin of each in the same order.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn candidate_columns(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<CandidateColumns> {
+    // A linear constant is estimated like a parameter, all others are searched.
     let is_linear = |single: &SingleCandidate| {
         single
             .constants
             .iter()
             .any(|c| c.2 == ConstantSearch::Linear)
     };
+    // Stage 1: the values of constants, and the rounds in which they are evaluated.
     let grids = grids(candidates, model, all)?;
     // Without linear constants one evaluation of the known effects is enough.
     let of_known = if candidates.singles.iter().any(is_linear) {
@@ -60,9 +64,11 @@ pub(crate) fn candidate_columns(
         })
         .filter(|(_, _, of_round): &(_, _, Vec<usize>)| !of_round.is_empty())
         .collect();
+    // Stage 2: evaluate all rounds.
     let made: Vec<Outcome<Vec<Vec<ForceColumn>>>> = jobs
         .par_iter()
         .map(|(sort, round, of_round)| {
+            // Candidates with fewer values than rounds take no part in the later ones.
             let value = |k: usize, search: &ConstantSearch| match search {
                 ConstantSearch::Linear => (*round).min(1) as f64,
                 ConstantSearch::Range { .. } => grids[k][*round],
@@ -70,12 +76,15 @@ pub(crate) fn candidate_columns(
             single_columns(candidates, of_round, model, all, *sort, &value)
         })
         .collect();
+    // Stage 3: collect columns by single candidate and round, in the order of the rounds.
     let mut found: Vec<Vec<Vec<ForceColumn>>> = vec![Vec::new(); candidates.singles.len()];
     for ((_, _, of_round), columns) in jobs.iter().zip(made) {
         for (k, columns) in of_round.iter().zip(columns?) {
             found[*k].push(columns);
         }
     }
+    // Stage 4: candidates are sums of single entries; those without finite values are reported.
+    // Origins lead back from columns to entries.
     let (mut made, mut origins, mut undefined) = (Vec::new(), Vec::new(), Vec::new());
     for (k, entry) in candidates.entries.iter().enumerate() {
         if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
@@ -91,9 +100,11 @@ pub(crate) fn candidate_columns(
     }
     // The candidates have copies, so this memory can be freed before the tilt is computed.
     drop(found);
+    // Stage 5: tilt and delay, which change the model.
     if let Some((change, derivation)) = &candidates.tilt {
         let tilt = tilt(derivation, model, all)?;
         if !tilt.axes.is_empty() {
+            // One angle for each axis about which a tilt has an effect.
             let angle = |axis: &usize| EffectParameter {
                 symbol: TILTS[*axis].to_owned(),
                 unit: "rad".to_owned(),
@@ -110,6 +121,7 @@ pub(crate) fn candidate_columns(
         }
     }
     if let Some(change) = &candidates.delay {
+        // A force signal can be late, never early.
         let parameter = EffectParameter {
             symbol: "T".to_owned(),
             unit: "s".to_owned(),
@@ -135,15 +147,19 @@ pub(crate) fn candidate_columns(
 }
 
 /// Values that are tried for the constant of each single candidate; one where it has none.
+///
+/// Fails when a pose has no solution.
 fn grids(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<Vec<Vec<f64>>> {
+    // Without constants no motion needs to be evaluated.
     let is_known = |single: &SingleCandidate| single.constants.is_empty();
     if candidates.singles.iter().all(is_known) {
         return Ok(vec![vec![1.0]; candidates.singles.len()]);
     }
+    // Ranges may be relative to rate or travel of the place.
     let motions = PlaceMotions::new(model, all)?;
     let scales = shared_scales(candidates, &motions);
     let singles = candidates.singles.iter().zip(scales);
@@ -158,6 +174,7 @@ fn is_finite(column: &ForceColumn) -> bool {
 
 /// Kind and places of an entry.
 fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffect {
+    // All places of an entry have the same kind.
     let first = &candidates.singles[entry.singles[0]];
     let singles = entry.singles.iter().map(|k| &candidates.singles[*k]);
     let places = singles.flat_map(|single| &single.spots);
@@ -167,9 +184,10 @@ fn effect(candidates: &DerivedCandidates, entry: &CandidateEntry) -> LocatedEffe
     }
 }
 
-/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one grid, that of the place that
-/// moves most.
+/// Largest rate and travel of the place of each single candidate. Places that may share a constant use one
+/// grid, that of the place that moves most.
 fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<[f64; 2]> {
+    // Each place at first has the scale of its own motion.
     let own = |single: &SingleCandidate| motions.scale(single.spots[0].place);
     let mut scales: Vec<[f64; 2]> = candidates.singles.iter().map(own).collect();
     // A scale spreads over entries that share places, until nothing changes.
@@ -177,6 +195,7 @@ fn shared_scales(candidates: &DerivedCandidates, motions: &PlaceMotions) -> Vec<
         let before = scales.clone();
         for entry in &candidates.entries {
             let of_entry = entry.singles.iter().map(|k| scales[*k]);
+            // The largest rate and travel among the places of the entry.
             let most = of_entry.fold([0.0_f64; 2], |m, s| [m[0].max(s[0]), m[1].max(s[1])]);
             for k in &entry.singles {
                 scales[*k] = most;
@@ -200,8 +219,8 @@ pub(crate) struct CandidateColumns {
     pub(crate) grids: Vec<Vec<f64>>,
 }
 
-/// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an effect; `None`
-/// where it changes the model rather than adds columns.
+/// The entry of the candidates that a candidate in numbers comes from, and which of its parameters have an
+/// effect; `None` where it changes the model rather than adds columns.
 pub(crate) type CandidateOrigin = Option<(usize, Vec<bool>)>;
 
 /// A candidate that changes the model instead of adding columns.
@@ -227,6 +246,8 @@ fn change_candidate(
 }
 
 /// Columns of some single candidates for given values of their constants.
+///
+/// Fails when a pose has no solution.
 fn single_columns(
     candidates: &DerivedCandidates,
     which: &[usize],
@@ -235,6 +256,7 @@ fn single_columns(
     sort: EvaluationFrequency,
     value: &dyn Fn(usize, &ConstantSearch) -> f64,
 ) -> Outcome<Vec<Vec<ForceColumn>>> {
+    // Candidates are derived in groups, so that the known ones are evaluated once only.
     let derivation = match sort {
         EvaluationFrequency::Known => &candidates.known,
         EvaluationFrequency::Searched => &candidates.searched,
@@ -250,20 +272,25 @@ fn single_columns(
             }
         }
     }
+    // The reduction assigns products of parameters to columns.
     let evaluator = ModelEvaluator::with_constants(derivation, constants);
     let reduction = &derivation.reduction;
+    // Each parameter of a candidate enters products with the power 1.
     let holds =
         |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
+    // All other columns of the derivation are zero in this round.
     let wanted = |k: usize| {
         let mut parameters = which
             .iter()
             .flat_map(|w| &candidates.singles[*w].parameters);
         parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
     };
+    // Columns of all requested candidates in one pass.
     let columns = regressor_of(all, &evaluator, model, &wanted)?;
     // In products with other parameters, such as a mass at an unknown place, the others have their nominal values.
     let of = |(_, parameter): &(String, usize)| -> ForceColumn {
         let mut sum = ForceColumn(vec![None; model.drives().len()]);
+        // A parameter may occur in several products.
         for (k, product) in reduction.retained.iter().enumerate() {
             let powers = &reduction.products[*product].0;
             if holds(*product, *parameter) {
@@ -284,11 +311,14 @@ fn single_columns(
 }
 
 /// Forces of the drives for a constant force or torque of one at each place where the library has a force offset.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn unit_forces(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<Vec<(CandidatePlace, ForceColumn)>> {
+    // A constant force at one place.
     let is_constant = |k: &usize| {
         let single = &candidates.singles[*k];
         candidates.kinds[single.kind].name == CONSTANT && single.spots.len() == 1
@@ -302,6 +332,7 @@ pub(crate) fn unit_forces(
         EvaluationFrequency::Known,
         &|_, _| 1.0,
     )?;
+    // A force offset has one column.
     let of = |(k, columns): (&usize, Vec<ForceColumn>)| {
         let column = columns.into_iter().next()?;
         Some((candidates.singles[*k].spots[0].clone(), column))
@@ -317,11 +348,13 @@ fn candidate(
     grids: &[Vec<f64>],
 ) -> Option<(CandidateEffect, Vec<bool>)> {
     let first = &candidates.singles[entry.singles[0]];
+    // Symbols, units and signs come from the kind.
     let kind = &candidates.kinds[first.kind];
     let is_part_of_load = is_part_of_load(kind);
     let mut parameters: Vec<EffectParameter> = (first.parameters.iter())
         .filter_map(|(symbol, _)| {
             let parameter = kind.parameters.iter().find(|p| p.symbol == *symbol)?;
+            // The unit depends on whether the place has a force or a torque.
             let carries = first.spots[0].carries;
             let unit = parameter.units.iter().find(|(c, _)| *c == carries);
             Some(EffectParameter {
@@ -335,6 +368,7 @@ fn candidate(
     // Columns that depend on the load are computed later, for the load of the current fit.
     if first.sort == EvaluationFrequency::LoadDependent {
         let felt = vec![true; parameters.len()];
+        // All parameters count as having an effect until the load is known.
         let candidate = CandidateEffect {
             effect,
             parameters,
@@ -347,7 +381,9 @@ fn candidate(
         };
         return Some((candidate, felt));
     }
+    // Places of an entry share their parameters, so that their columns are added.
     let sum = |round: usize| -> Vec<ForceColumn> {
+        // Columns of the first place, then those of the others.
         let mut columns = found[entry.singles[0]][round].clone();
         for other in &entry.singles[1..] {
             let more = &found[*other];
@@ -357,6 +393,7 @@ fn candidate(
         }
         columns
     };
+    // One choice for each value of the searched constant.
     let searched = first.range();
     let mut choices: Vec<ColumnChoice> = match searched {
         Some(symbol) => (grids[entry.singles[0]].iter().enumerate())
@@ -370,12 +407,14 @@ fn candidate(
             columns: sum(0),
         }],
     };
+    // A linear constant gives a further column instead of a search.
     let linear = first
         .constants
         .iter()
         .find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
-        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of the product.
+        // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of
+        // the product.
         let mut shifts = sum(1);
         for (shift, column) in shifts.iter_mut().zip(&choices[0].columns) {
             shift.add(-1.0, column);
@@ -407,6 +446,7 @@ fn candidate(
     if parameters.is_empty() {
         return None;
     }
+    // The candidate with one choice for each value of its constant.
     let candidate = CandidateEffect {
         effect,
         parameters,
@@ -425,8 +465,10 @@ fn is_part_of_load(kind: &EffectKind) -> bool {
     (kind.mechanics).map_or(kind.on.contains(&ActsOn::Point), Mechanics::is_part_of_load)
 }
 
-/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and decimated like the forces;
-/// `tried` gives the values of the constant of each single candidate.
+/// Columns of candidates that depend on the load of the drives, of all or of one entry. Loads are stacked and
+/// decimated like the forces; `tried` gives the values of the constant of each single candidate.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn load_dependent_columns(
     candidates: &DerivedCandidates,
     model: &Model,
@@ -435,7 +477,9 @@ pub(crate) fn load_dependent_columns(
     only: Option<usize>,
     tried: &dyn Fn(usize) -> Vec<f64>,
 ) -> Outcome<Vec<(usize, Vec<ColumnChoice>)>> {
+    // One entry is requested if its constant is refined.
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
+    // Only candidates that depend on the load are evaluated.
     let which: Vec<usize> = (0..candidates.singles.len())
         .filter(|k| {
             candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k)
@@ -448,6 +492,7 @@ pub(crate) fn load_dependent_columns(
     let mut start = 0;
     let mut loaded = Vec::new();
     for (one, is_check) in all {
+        // Number of decimated samples of this recording.
         let kept = one.time().len();
         let of = |values: &Option<Vec<f64>>| match values {
             Some(values) => interpolate(
@@ -457,11 +502,13 @@ pub(crate) fn load_dependent_columns(
             ),
             None => vec![0.0; one.samples()],
         };
+        // The copy of the segment has the loads of the current fit.
         let mut one = (*one).clone();
         one.load = Some(load.0.iter().map(of).collect());
         loaded.push((one, *is_check));
         start += kept;
     }
+    // The segments with the current loads.
     let all: Vec<(&RecordingSegment, bool)> =
         loaded.iter().map(|(one, check)| (one, *check)).collect();
     let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
@@ -469,6 +516,7 @@ pub(crate) fn load_dependent_columns(
     // `found[single][round]`.
     let mut found: Vec<Vec<Vec<ForceColumn>>> = vec![Vec::new(); which.len()];
     for round in 0..tried.iter().map(Vec::len).max().unwrap_or(0) {
+        // Rounds as for the other candidates, one value of each constant at a time.
         let takes_part = |k: &usize| round < tried[*k].len();
         let of_round: Vec<usize> = (0..which.len()).filter(takes_part).collect();
         let value = |single: usize, search: &ConstantSearch| match search {
@@ -488,6 +536,7 @@ pub(crate) fn load_dependent_columns(
             found[k].push(columns);
         }
     }
+    // Single candidates are summed to entries, as for the other candidates.
     let mut made = Vec::new();
     let wanted = candidates.entries.iter().enumerate();
     for (k, entry) in wanted.filter(|(k, _)| only.is_none_or(|only| only == *k)) {
@@ -495,6 +544,7 @@ pub(crate) fn load_dependent_columns(
         let Some((first, others)) = places.split_first() else {
             continue;
         };
+        // One choice for each value of the searched constant.
         let symbol = candidates.singles[entry.singles[0]].range();
         let choice = |(round, value): (usize, &f64)| {
             let mut columns = found[*first][round].clone();
@@ -522,6 +572,7 @@ pub(crate) fn load_dependent_columns(
 
 /// Linear interpolation between samples of which every `factor`-th was kept.
 fn interpolate(kept: &[f64], factor: usize, samples: usize) -> Vec<f64> {
+    // The last value is kept beyond the end.
     let last = kept.len().saturating_sub(1);
     let at = |i: usize| {
         let k = (i / factor).min(last);
@@ -539,6 +590,7 @@ pub(crate) fn refined_columns(
     entry: &CandidateEntry,
     constant: f64,
 ) -> Option<Vec<ForceColumn>> {
+    // Only the searched constant changes.
     let value = |_: usize, search: &ConstantSearch| match search {
         ConstantSearch::Linear => 0.0,
         ConstantSearch::Range { .. } => constant,
@@ -552,6 +604,7 @@ pub(crate) fn refined_columns(
         &value,
     )
     .ok()?;
+    // Columns of all places are added.
     let mut found = found.into_iter();
     let mut columns = found.next()?;
     for more in found {

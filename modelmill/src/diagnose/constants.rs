@@ -1,5 +1,6 @@
-//! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by each constant, by
-//! central differences. There are none if all base parameters are fixed, since these depend on the constants too.
+//! Candidates for a wrong length or angle of the model: first and second derivatives of the base columns by
+//! each constant, by central differences. There are none if all base parameters are fixed, since these depend
+//! on the constants too.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -24,9 +25,11 @@ pub(crate) fn constants(
 ) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
+    // Fixed base parameters were computed with the nominal lengths.
     if (0..model.base.len()).all(is_held) {
         return Vec::new();
     }
+    // The columns for a constant that differs by a step.
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
@@ -37,9 +40,11 @@ pub(crate) fn constants(
             model,
         )
     };
+    // The columns at the nominal constants are the same for all of them.
     let mut middle = None;
     let mut candidates = Vec::new();
     for (k, constant) in mechanism.constants.iter().enumerate() {
+        // Other units, such as those of counts, are no geometry.
         let step = match constant.unit.as_str() {
             "m" => STEP * reach(mechanism),
             "rad" => STEP,
@@ -66,6 +71,7 @@ pub(crate) fn constants(
                 }
                 without_rounding(sum)
             };
+            // The central first difference.
             let first = 0.5 / step;
             // The central second difference.
             let second = 1.0 / (step * step);
@@ -75,6 +81,7 @@ pub(crate) fn constants(
                 (-2.0 * second, middle),
                 (second, &back[p]),
             ]);
+            // Estimated base parameters get columns, fixed ones a force.
             for (part, change) in [(&mut slope, first), (&mut bend, second)] {
                 if is_held(p) {
                     part.fixed.add(model.nominal[p], &change);
@@ -83,6 +90,7 @@ pub(crate) fn constants(
                 }
             }
         }
+        // A constant without effect on any force is no candidate.
         if slope.fixed.is_zero() && slope.base.iter().all(ForceColumn::is_zero) {
             continue;
         }

@@ -1,6 +1,6 @@
-//! Candidates for errors of encoders: a wrong zero, or an eccentric disc whose error repeats once or several times per turn. The
-//! derivatives of the forces by position, rate and acceleration come from central differences of the fitted model. The force of any
-//! small error of the motion is then a sum of three products.
+//! Candidates for errors of encoders: a wrong zero, or an eccentric disc whose error repeats once or several
+//! times per turn. The derivatives of the forces by position, rate and acceleration come from central
+//! differences of the fitted model. The force of any small error of the motion is then a sum of three products.
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
@@ -23,13 +23,14 @@ const TIMES: [u32; 16] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 30, 36, 48, 6
 /// Steps of the differences, as parts of the largest value.
 const STEP: f64 = 1e-5;
 
-/// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base parameters; `None` if the
-/// forces cannot be evaluated next to the recorded motion.
+/// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base
+/// parameters; `None` if the forces cannot be evaluated next to the recorded motion.
 pub(crate) fn sensitivities(
     model: &Model,
     all: &SegmentList<'_>,
     values: &[f64],
 ) -> Vec<Option<[ForceColumn; 3]>> {
+    // One coordinate at a time; a failure of one does not affect the others.
     let coordinates = 0..model.motions().len();
     coordinates
         .map(|i| sensitivity(model, all, values, i))
@@ -40,6 +41,7 @@ pub(crate) fn sensitivities(
 pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<CandidateEffect> {
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
+    // A free body is measured by other means than an encoder.
     let each = model.motions().into_iter().zip(slopes).zip(active);
     let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
     let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
@@ -60,6 +62,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
 
 /// A fault of a coordinate's encoder with parameters in its unit.
 fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> CandidateEffect {
+    // Errors of an encoder have the unit of its coordinate.
     let parameter = |symbol: &&str| EffectParameter {
         symbol: (*symbol).to_owned(),
         unit: if is_angle { "rad" } else { "m" }.to_owned(),
@@ -80,7 +83,8 @@ fn disturbance(kind: &str, name: String, symbols: &[&str], is_angle: bool) -> Ca
     }
 }
 
-/// Candidates for an error of each encoder with sine and cosine of its angle, for each possible number of waves per turn.
+/// Candidates for an error of each encoder with sine and cosine of its angle, for each possible number of waves
+/// per turn.
 pub(crate) fn encoders(
     model: &Model,
     all: &SegmentList<'_>,
@@ -90,6 +94,7 @@ pub(crate) fn encoders(
     let motions = model.motions();
     let mut candidates = Vec::new();
     for (i, (name, is_angle)) in motions.iter().enumerate() {
+        // Position, rate or acceleration.
         let of = |order: usize| -> Vec<f64> {
             let mut all_values = Vec::new();
             for (one, _) in all {
@@ -99,6 +104,7 @@ pub(crate) fn encoders(
             }
             all_values
         };
+        // Motion of the coordinate at the decimated samples of all recordings.
         let [q, qd, qdd] = [0, 1, 2].map(of);
         let low = q.iter().copied().fold(f64::INFINITY, f64::min);
         let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
@@ -109,6 +115,7 @@ pub(crate) fn encoders(
         let Some(slopes) = &slopes[i] else {
             continue;
         };
+        // The largest step between samples decides which waves can be seen.
         let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
         // A prismatic coordinate has no turn: its error repeats along the travel.
@@ -149,6 +156,7 @@ pub(crate) fn encoders(
                 columns: vec![wave(0.0), wave(0.5 * std::f64::consts::PI)],
             })
         };
+        // Waves that are too short at the largest rate are skipped.
         let choices: Vec<ColumnChoice> = TIMES.into_iter().filter_map(choice).collect();
         if choices.is_empty() {
             continue;
@@ -167,10 +175,12 @@ pub(crate) fn encoders(
     candidates
 }
 
-/// Base parameters by least squares, with each drive weighted by its squared force; fixed ones keep their nominal values.
+/// Base parameters by least squares, with each drive weighted by its squared force; fixed ones keep their
+/// nominal values.
 pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParameters) -> Vec<f64> {
     let mut all = NormalEquations::new(problem.base.len());
     for (d, measured) in problem.measured.0.iter().enumerate() {
+        // A drive without force has no equations.
         let Some(measured) = measured else { continue };
         let mut one = NormalEquations::new(problem.base.len());
         let columns: Vec<Option<&[f64]>> = problem.base.iter().map(|c| c.0[d].as_deref()).collect();
@@ -181,6 +191,7 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
         one.rhs *= weight;
         all.merge(&one);
     }
+    // The normal equations have one solution for all drives.
     let solved = all.solve().values;
     let mut next = solved.iter();
     (0..model.base.len())
@@ -194,8 +205,8 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
         .collect()
 }
 
-/// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces cannot be evaluated next to
-/// the recorded motion.
+/// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces
+/// cannot be evaluated next to the recorded motion.
 fn sensitivity(
     model: &Model,
     all: &SegmentList<'_>,
@@ -204,8 +215,10 @@ fn sensitivity(
 ) -> Option<[ForceColumn; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
+        // The forces with one derivative of the motion changed by a step of either sign.
         let along = |sign: f64| {
             stack(all, |one| {
+                // A copy of the recording with one column changed.
                 let mut turned: RecordingSegment = one.clone();
                 let run = &mut turned.run;
                 let column = &mut [&mut run.q, &mut run.qd, &mut run.qdd][order][coordinate];

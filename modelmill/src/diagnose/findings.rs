@@ -1,5 +1,5 @@
-//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model before and after the
-//! effects, and regions where the error is largest. Text, JSON and the page print them.
+//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model
+//! before and after the effects, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
@@ -30,7 +30,8 @@ use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
 use super::versions::ModelVersion;
 use super::words::{self, ValidationMethod};
 
-/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit are worthless then.
+/// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
+/// are worthless then.
 fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Outcome {
     let diagnosis = &answer.diagnosis;
     let last = diagnosis.steps.last();
@@ -52,13 +53,14 @@ fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Out
     )))
 }
 
-/// Options of a diagnosis. [`Question::default`] estimates all parameters that are not known in the model file.
+/// Options of a diagnosis. [`DiagnosisOptions::default`] estimates all parameters that are not known in the model
+/// file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagnosisOptions {
     /// Which parameters keep their nominal values.
     pub fixed: FixedParameters,
-    /// Whether to diagnose again with all base parameters fixed, if estimates differ from their nominal values. Estimated
-    /// parameters may hide a missing effect.
+    /// Whether to diagnose again with all base parameters fixed, if estimates differ from their nominal values.
+    /// Estimated parameters may hide a missing effect.
     pub repeat_with_nominal: bool,
 }
 
@@ -71,17 +73,17 @@ impl Default for DiagnosisOptions {
     }
 }
 
-/// DiagnosisFindings of a diagnosis.
+/// Findings of a diagnosis.
 pub struct DiagnosisFindings {
     /// Verdict, error after each step, candidates with the reasons of their rejection, and the unexplained residual.
     pub diagnosis: ModelDiagnosis,
-    /// MissingEffect effects.
+    /// Missing effects.
     pub missing: Vec<MissingEffect>,
     /// Laws that are in no library and would explain the residual: hypotheses.
     pub laws: Vec<LawHypothesis>,
     /// Effects that the recordings can neither show nor exclude.
     pub undecided: Vec<UndecidedEffect>,
-    /// Base parameters of the bodies that differ from the file, the one with the most standard standard_deviations first.
+    /// Base parameters of the bodies that differ from the file, the one with the most standard deviations first.
     pub off_nominal: Vec<OffNominalParameter>,
     /// The diagnosis with all parameters fixed at their nominal values, if it was requested and some estimates differ.
     pub with_nominal: Option<NominalDiagnosis>,
@@ -165,7 +167,7 @@ pub struct EffectEstimate {
 
 /// A diagnosis with all parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
-    /// Verdict, ladder and candidates.
+    /// Verdict, steps and candidates.
     pub diagnosis: ModelDiagnosis,
     /// Missing effects with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
@@ -203,16 +205,18 @@ impl DiagnosisFindings {
 }
 
 impl Model {
-    /// Finds which physical effects the model lacks. Parameters are fitted to `fit`; errors are judged on the validation runs `check`,
-    /// or by cross-validation without any.
+    /// Finds which physical effects the model lacks. Parameters are fitted to `fit`; errors are judged on the
+    /// validation runs `check`, or by cross-validation without any.
     ///
-    /// Fails if a recording is too short, has no forces, or has positions at which the loops of the mechanism cannot close.
+    /// Fails if a recording is too short, has no forces, or has positions at which the loops of the mechanism
+    /// cannot close.
     pub fn diagnose(
         &self,
         fit: &[&PreparedRecording],
         check: &[&PreparedRecording],
         question: &DiagnosisOptions,
     ) -> Outcome<DiagnosisFindings> {
+        // Long recordings are decimated first, to save memory and time.
         let fewer = |all: &[&PreparedRecording]| -> Outcome<Vec<PreparedRecording>> {
             all.iter().map(|one| one.for_diagnosis(self)).collect()
         };
@@ -222,6 +226,7 @@ impl Model {
         let data = segments(self, &of_fit, &of_check);
         let held = question.fixed;
         let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
+        // Differences between recordings are found first, since they would look like effects.
         let between =
             (self.host()).run_job("comparing the recordings with each other", 0, |_| {
                 faults::run_differences(self, &recordings)
@@ -299,6 +304,7 @@ impl Model {
             answer,
             variables,
         };
+        // The parts of the findings that depend on others are filled in order.
         findings.missing = missing_effects(&findings);
         findings.laws = laws::hypotheses(&findings.before.model, &findings.diagnosis);
         findings.undecided = undecided_effects(&findings);
@@ -324,11 +330,12 @@ impl DiagnosisFindings {
         self.after.as_ref().unwrap_or(&self.before)
     }
 
-    /// The experiment that decides whether effects of a kind are present at some places: the text of the library, and the motion
-    /// to record.
+    /// The experiment that decides whether effects of a kind are present at some places: the text of the
+    /// library, and the motion to record.
     pub(crate) fn deciding_experiment(&self, kind: &str, places: &str) -> String {
         let mut kinds = self.answer.candidates.kinds.iter();
         let known = kinds.find(|one| one.name == kind);
+        // The text of the library comes first, if it has one.
         let known = known.map_or("", |one| one.doubles.as_str());
         let motion = format!(
             "To decide, record a motion over more of the travel of {places}, at other speeds and with another load."
@@ -342,7 +349,10 @@ impl DiagnosisFindings {
     }
 }
 
-/// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then belong to earlier states.
+/// The model with the effects, identified. If a delay changed, recordings are prepared again, since forces then
+/// belong to earlier states.
+///
+/// Fails when the derivation of the model with the effects fails, or when it is cancelled.
 fn version_with_effects(
     model: &Model,
     edited: &CompletedModelFile,
@@ -354,6 +364,7 @@ fn version_with_effects(
     let model = (model.host())
         .derive(&model.path, edited.loaded.clone())?
         .with_values_of(model);
+    // Without a new delay the prepared segments are used again.
     let is_later = model.derivation.mechanism.force_delay.to_bits() != delay.to_bits();
     let [fit, check] = if is_later {
         // With a delay forces belong to earlier states.
@@ -377,11 +388,14 @@ fn version_with_effects(
 }
 
 /// The diagnosis with all parameters fixed at their nominal values.
+///
+/// Fails when it is cancelled.
 fn nominal_diagnosis(
     findings: &DiagnosisFindings,
     between: &[RecordingDifference],
 ) -> Outcome<NominalDiagnosis> {
     let version = &findings.before;
+    // The diagnosis uses the same split into fitted and validation runs.
     let of = |is_check: bool| -> Vec<RecordingSegment> {
         let runs = version.data.iter().zip(&version.runs);
         let wanted = runs.filter(|(_, run)| run.is_check == is_check);
@@ -466,11 +480,12 @@ fn search_estimates(
     parameters.iter().zip(values).map(of).collect()
 }
 
-/// Estimates of an effect with standard deviations, from identification with all effects found. If the model with the effects cannot
-/// separate them, those of the search.
+/// Estimates of an effect with standard deviations, from identification with all effects found. If the model
+/// with the effects cannot separate them, those of the search.
 fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<EffectEstimate> {
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
     let mut all = search_estimates(parameters, found);
+    // Constants have no standard deviation, since they were found by a search.
     all.extend(found.constants.iter().map(|(name, value)| EffectEstimate {
         name: name.clone(),
         value: *value,
@@ -524,6 +539,7 @@ fn identified_parameter<'a>(
     let term = (effect.kind == entry.kind)
         .then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
     let reduction = &derivation.reduction;
+    // A parameter is determined by itself if its product is retained alone.
     let k = reduction
         .retained
         .iter()
@@ -543,8 +559,8 @@ fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect)
     (!kind.doubles.is_empty()).then(|| kind.doubles.clone())
 }
 
-/// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds no force that a
-/// motion could make larger.
+/// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds
+/// no force that a motion could make larger.
 fn separation(
     findings: &DiagnosisFindings,
     found: &IdentifiedEffect,
@@ -556,6 +572,7 @@ fn separation(
         kind.next()
             .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
+    // Alternatives without columns along other motions cannot be separated by planning.
     let rivals = found.indistinguishable_from.iter().filter(is_force);
     let rivals: Vec<LocatedEffect> = rivals.cloned().collect();
     if rivals.is_empty() || !is_force(&&found.effect) {
@@ -597,6 +614,7 @@ fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
         .as_ref()
         .unwrap_or(&findings.places);
     let mut regions = Vec::new();
+    // Each unexplained drive has at least one region.
     for d in &diagnosis.unexplained {
         let of_channel = left.regions.iter().filter(|r| r.channel == channels[*d]);
         let before = regions.len();
@@ -637,6 +655,7 @@ fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
         judged.first().copied().unwrap_or(0),
         judged.last().map_or(0, |k| k + 1),
     );
+    // Validation runs are contiguous, since fitted recordings come first.
     let runs = &version.runs[first..last];
     let measured: Vec<_> = runs.iter().map(|run| run.measured.clone()).collect();
     let forces: Vec<_> = runs.iter().map(|run| run.forces.clone()).collect();
@@ -649,8 +668,11 @@ fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
 }
 
 /// Variables along the recordings that are judged, one after the other.
+///
+/// Fails when a pose has no solution.
 fn variables(version: &ModelVersion) -> Outcome<Vec<(String, Vec<f64>)>> {
     let mut joined: Vec<(String, Vec<f64>)> = Vec::new();
+    // All runs have the same variables.
     for k in version.validation_runs() {
         let variables = along::variables(&version.model, &version.data[k])?;
         if joined.is_empty() {

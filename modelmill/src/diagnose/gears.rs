@@ -1,6 +1,6 @@
-//! Candidates for compliance and backlash of gears. The encoder measures the motor side. The load is displaced by torque times
-//! compliance, or by half the play towards the loaded flank. This acts on the forces like an error of the encoder. Inertia of the motor
-//! and impacts between flanks are neglected.
+//! Candidates for compliance and backlash of gears. The encoder measures the motor side. The load is displaced
+//! by torque times compliance, or by half the play towards the loaded flank. This acts on the forces like an
+//! error of the encoder. Inertia of the motor and impacts between flanks are neglected.
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
@@ -15,11 +15,14 @@ use crate::regressors::SegmentList;
 
 use super::numbers::stack;
 
-/// Kinds with their parameters. The displacement of the load is torque times compliance, or half the play to either side.
+/// Kinds with their parameters. The displacement of the load is torque times compliance, or half the play to
+/// either side.
 const KINDS: [(&str, &str); 2] = [("drive_compliance", "compliance"), ("backlash", "play")];
 
-/// Compliance and backlash of every drive on a joint. `slopes` are the derivatives of the forces by position, rate and acceleration of
-/// each coordinate; `values` are the base parameters.
+/// Compliance and backlash of every drive on a joint. `slopes` are the derivatives of the forces by position,
+/// rate and acceleration of each coordinate; `values` are the base parameters.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn gears(
     model: &Model,
     all: &SegmentList<'_>,
@@ -33,6 +36,7 @@ pub(crate) fn gears(
     let n = model.drives().len();
     let loads = stack(all, |one| {
         let loads = along::forces(model, one, &carried)?;
+        // Central differences in time.
         let rate = |values: &[f64]| -> Vec<f64> {
             let last = values.len().saturating_sub(1);
             let time = &one.run.time;
@@ -51,20 +55,24 @@ pub(crate) fn gears(
     let active = model.active_coordinates();
     let driven = mechanism.drives.iter().filter(|drive| drive.is_driven);
     let mut candidates = Vec::new();
+    // Only gears at joints are modelled.
     for (d, drive) in driven.enumerate() {
         let DriveKind::Joint(joint) = drive.kind else {
             continue;
         };
         let name = &mechanism.coordinates[joint.0].name;
+        // Gears at passive joints have no recorded motion.
         let Some(i) = active.iter().position(|one| one == name) else {
             continue;
         };
         let Some(slopes) = slopes.get(i).and_then(Option::as_ref) else {
             continue;
         };
+        // Units depend on the kind of the joint.
         let is_angle = model.motions()[i].1;
         for (kind, symbol) in KINDS {
             let is_yielding = kind == "drive_compliance";
+            // Displacement of the load and its derivatives: order 0, 1 and 2.
             let shift = |order: usize, sample: usize| match (is_yielding, order) {
                 (true, order) => loads[order * n + d][sample],
                 // Half the play, towards the side that the load presses.
@@ -85,6 +93,7 @@ pub(crate) fn gears(
             if column.is_zero() {
                 continue;
             }
+            // The unit of compliance or play depends on the kind of joint.
             let unit = match (is_yielding, is_angle) {
                 (true, true) => "rad/(N m)",
                 (true, false) => "m/N",

@@ -1,5 +1,5 @@
-//! Candidates for changed friction, used if the friction of the model is fixed at earlier values. Friction differs from day to day;
-//! such a change is a disturbance, not a missing effect.
+//! Candidates for changed friction, used if the friction of the model is fixed at earlier values. Friction
+//! differs from day to day; such a change is a disturbance, not a missing effect.
 
 use modelmill_identify::diagnose::{
     CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
@@ -12,7 +12,8 @@ use crate::model::Model;
 /// Kinds of friction whose values change from day to day.
 const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
 
-/// A change of the friction that the model has, for each set of drives that share it; `base` are the columns of all base parameters.
+/// A change of the friction that the model has, for each set of drives that share it; `base` are the columns of
+/// all base parameters.
 pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffect> {
     let effects = &model.derivation.mechanism.effects;
     let own = effects
@@ -47,11 +48,13 @@ fn change(
     };
     let drives: Vec<usize> = at.iter().map(drive).collect::<Option<_>>()?;
     let reduction = &model.derivation.reduction;
+    // The column of a term is that of the base parameter that consists of its parameter alone.
     let base_of = |term: &&EffectTerm| {
         let is_its = |k: &usize| reduction.products[*k].0 == [(term.parameter.0, 1)];
         reduction.retained.iter().position(is_its)
     };
     let which: Vec<usize> = terms.iter().map(base_of).collect::<Option<_>>()?;
+    // The estimate is the change of the fixed value.
     let parameter = |(term, k): (&&EffectTerm, &usize)| EffectParameter {
         symbol: format!("change of {}", term.symbol),
         unit: model.base[*k].unit.clone(),

@@ -1,5 +1,5 @@
-//! Laws for the residual that are in no library, with the names of a model: the places where they may act, their formulas over
-//! coordinates, drives and loads, and the entry of a library with which `add` can add them.
+//! Laws for the residual that are in no library, with the names of a model: the places where they may act,
+//! their formulas over coordinates, drives and loads, and the entry of a library with which `add` can add them.
 
 use std::fmt::Write as _;
 
@@ -24,11 +24,14 @@ use super::findings::EffectEstimate;
 use super::places::{CandidatePlace, candidate_places};
 
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn sites(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<Vec<LawSite>> {
+    // The file's mechanism, since places have its names.
     let mechanism = &model.loaded.mechanism;
     let forces = unit_forces(candidates, model, all)?;
     let mut sites: Vec<LawSite> = Vec::new();
@@ -38,11 +41,13 @@ pub(crate) fn sites(
             continue;
         }
         // A place without a drive acts on the drives through the mechanism; its column comes from the derivation.
+        // A drive acts on itself alone.
         let (force, channel) = match (spot.place, forces.iter().find(|(at, _)| *at == spot)) {
             (EffectPlace::Drive(d), _) => (drive_column(model, all, d.0), Some(d.0)),
             (_, Some((_, force))) => (force.clone(), None),
             (_, None) => continue,
         };
+        // A place without effect on any drive cannot be seen.
         if force.is_zero() {
             continue;
         }
@@ -55,6 +60,7 @@ pub(crate) fn sites(
         });
         places.push(spot);
     }
+    // Positions, rates and accelerations of the places, recording by recording.
     for (one, _) in all {
         let motions = motions(model, one, &places)?;
         for (site, [position, rate, acceleration]) in sites.iter_mut().zip(motions) {
@@ -68,6 +74,7 @@ pub(crate) fn sites(
 
 /// A force of one along a drive.
 fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColumn {
+    // Samples after decimation, over all recordings.
     let samples = all.iter().map(|(one, _)| one.time().len()).sum();
     let mut column = ForceColumn(vec![None; model.drives().len()]);
     column.0[drive] = Some(vec![1.0; samples]);
@@ -75,6 +82,8 @@ fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColu
 }
 
 /// Position, rate and acceleration of places along a recording, of the samples that are kept.
+///
+/// Fails when a pose has no solution.
 fn motions(
     model: &Model,
     one: &RecordingSegment,
@@ -83,22 +92,26 @@ fn motions(
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mechanism = &model.derivation.mechanism;
     let (active, passive) = model.derivation.coordinates();
+    // Positions and rates of the drives, for linear ones.
     let drives = along::columns(model, one, |states| evaluator.drive_motion(states))?;
     let of_passive = if passive.is_empty() {
         Vec::new()
     } else {
         along::columns(model, one, |states| evaluator.passive_motion(states))?
     };
+    // Active coordinates are recorded, passive ones are computed.
     let of_coordinate = |i: usize| -> Option<[Vec<f64>; 3]> {
         let run = &one.run;
         if let Some(k) = active.iter().position(|a| *a == i) {
             return Some([run.q[k].clone(), run.qd[k].clone(), run.qdd[k].clone()]);
         }
         let k = passive.iter().position(|p| *p == i)?;
+        // Positions come first, then rates and accelerations.
         let n = passive.len();
         Some([k, n + k, 2 * n + k].map(|at| of_passive[at].clone()))
     };
     let kept = |values: Vec<f64>| values.into_iter().step_by(one.decimation()).collect();
+    // The acceleration of a linear drive is the derivative of its rate.
     let motion = |spot: &CandidatePlace| {
         let found = match spot.place {
             EffectPlace::Coordinate(i) => of_coordinate(i.0),
@@ -119,6 +132,7 @@ fn motions(
 
 /// Central differences.
 fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
+    // One-sided at both ends.
     let last = values.len().saturating_sub(1);
     let at = |i: usize| {
         let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
@@ -135,14 +149,15 @@ fn slopes(values: &[f64], time: &[f64]) -> Vec<f64> {
 /// A law that would explain the residual; a hypothesis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposedLaw {
-    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives (`_length`) and loads of drives
-    /// (by the names of the drives).
+    /// The force that it adds at its place, as a formula over coordinates, rates (`_d`), lengths of drives
+    /// (`_length`) and loads of drives (by the names of the drives).
     pub expression: String,
     /// The drive or coordinate on which it acts.
     pub at: String,
     /// Its parameters.
     pub parameters: Vec<EffectEstimate>,
-    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it has an effect.
+    /// Share of the squared residual that it explains on data that were not fitted, on the drives on which it
+    /// has an effect.
     pub gain: f64,
     /// Effects found that become unnecessary with it.
     pub instead_of: Vec<LocatedEffect>,
@@ -178,6 +193,7 @@ impl ProposedLaw {
 /// Laws that a diagnosis proposes, by the names of the model.
 pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHypothesis> {
     let sites = &diagnosis.sites;
+    // Alternatives are named in the same way.
     let one = |proposal: &LawProposal| LawHypothesis {
         law: law(model, sites, &proposal.law),
         near_ties: (proposal.near_ties.iter())
@@ -190,12 +206,14 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHy
 /// A law of the search with the names of the model.
 fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
     let site = &sites[law.site];
+    // Parameters are numbered in the order of the terms.
     let mut named = LawFormula::new(law);
     let expression = named.text(law, &|variable, other| {
         variable_name(model, &sites[other.unwrap_or(law.site)], variable)
     });
     let mut parameters = Vec::new();
     let mut symbols = named.parameters.iter();
+    // One value for each parameter of the term.
     for term in &law.terms {
         let values = term.values.iter().zip(&term.standard_deviations);
         for ((value, deviation), symbol) in values.zip(symbols.by_ref()) {
@@ -207,6 +225,7 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
             });
         }
     }
+    // The entry uses rounded values, the hypothesis the exact ones.
     ProposedLaw {
         expression,
         at: site.name.clone(),
@@ -219,9 +238,11 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
 
 /// The name of a place's variable, as errors and recordings have it.
 fn variable_name(model: &Model, site: &LawSite, variable: LawVariable) -> String {
+    // A drive on a joint uses the name of the coordinate, a linear drive its own.
     let drive = site
         .channel
         .map(|d| &model.derivation.mechanism.drives[d].kind);
+    // Other places use their own name.
     let base = match drive {
         Some(DriveKind::Joint(i)) => &model.derivation.mechanism.coordinates[i.0].name,
         _ => &site.name,
@@ -248,7 +269,8 @@ fn variable_word(variable: LawVariable) -> &'static str {
     }
 }
 
-/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on the earlier motion.
+/// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on
+/// the earlier motion.
 fn library_entry(
     sites: &[LawSite],
     law: &Proposed,
@@ -259,18 +281,22 @@ fn library_entry(
     if products.any(LawProduct::has_memory) {
         return None;
     }
+    // The kind is written as TOML, with the words of the library instead of names of the model.
     let site = &sites[law.site];
+    // A second place gives the words `other_coordinate` and `other_rate`.
     let other = law.terms.iter().find_map(|term| term.product.other);
     let other = other.map(|other| &sites[other]);
     let mut formula = LawFormula::new(law);
     formula.with_symbols = true;
     let expression = formula.text(law, &|variable, _| variable_word(variable).to_owned());
+    // The kind is named after its place, so that several laws can be in one library.
     let kind = format!("law_of_{}", site.name);
     let on = if site.channel.is_some() {
         "drive"
     } else {
         "coordinate"
     };
+    // Places on angles have torques.
     let carries = if site.is_angle { "torque" } else { "force" };
     let mut text = format!("[[effect_kind]]\nname = \"{kind}\"\non = \"{on}\"\n");
     if let Some(other) = other {
@@ -281,6 +307,7 @@ fn library_entry(
         text,
         "expression = \"{expression}\"\nsays = \"A hypothesis that recordings suggest. It is no law of the machine until its cause is understood.\""
     );
+    // Units are those of the place: of a force or of a torque.
     text.push_str("[effect_kind.parameters]\n");
     for parameter in parameters {
         let _ = writeln!(
@@ -300,11 +327,13 @@ fn library_entry(
             round_significant(*value)
         );
     }
+    // Estimates become nominal values.
     let nominal = |p: &EffectEstimate| NewParameter {
         symbol: p.name.clone(),
         nominal: Some(round_significant(p.value)),
         ..NewParameter::default()
     };
+    // The effect acts at the first place; the second one is an argument.
     let at = std::iter::once(site).chain(other);
     Some(LawEntry {
         text,
@@ -328,8 +357,10 @@ struct LawFormula {
 }
 
 impl LawFormula {
-    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are several terms.
+    /// Symbols of the parameters: `k` for a term, `ks` and `kc` for sine and cosine, numbered if there are
+    /// several terms.
     fn new(law: &Proposed) -> Self {
+        // A single term needs no number.
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &LawTerm)| {
             let number = if several {
@@ -351,7 +382,8 @@ impl LawFormula {
         }
     }
 
-    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they have symbols.
+    /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they
+    /// have symbols.
     fn text(
         &mut self,
         law: &Proposed,
@@ -362,6 +394,7 @@ impl LawFormula {
         for term in &law.terms {
             let factors: Vec<Vec<String>> = (term.product.factors.iter())
                 .map(|factor| {
+                    // Variables of the second place have its name.
                     let is_other = matches!(
                         factor.variable,
                         LawVariable::OtherPosition | LawVariable::OtherRate
@@ -370,6 +403,7 @@ impl LawFormula {
                     self.factor(*factor, &name(factor.variable, other))
                 })
                 .collect();
+            // Sine and cosine have two parameters, all other factors one.
             let wave = factors.iter().find(|texts| texts.len() > 1);
             let mut product = Vec::new();
             if let Some(wave) = wave {
@@ -384,6 +418,7 @@ impl LawFormula {
             } else {
                 product.extend(symbols.next());
             }
+            // The remaining factors follow the parameter.
             let others = factors.iter().filter(|texts| texts.len() == 1);
             product.extend(others.map(|texts| texts[0].clone()));
             terms.push(product.join("*"));
@@ -410,6 +445,7 @@ impl LawFormula {
     /// A shape of a variable: one text, or those of sine and cosine.
     fn factor(&mut self, factor: LawFactor, z: &str) -> Vec<String> {
         let text = match factor.shape {
+            // Powers of half integers need a scale, so that the unit is independent of the power.
             LawShape::Power {
                 halves,
                 is_odd,
@@ -418,6 +454,7 @@ impl LawFormula {
                 if halves % 2 == 0 {
                     integer_power(z, halves / 2, is_odd)
                 } else {
+                    // An odd multiple of one half: whole powers times a root.
                     let share = format!("abs({z})/{}", self.constant("scale", scale, factor));
                     let whole = match halves / 2 {
                         0 => String::new(),
@@ -432,10 +469,12 @@ impl LawFormula {
                     format!("{sign}{whole}sqrt({share})")
                 }
             }
+            // A power about a centre other than zero.
             LawShape::Shifted { centre, power } => {
                 let centre = self.constant("centre", centre, factor);
                 format!("({})^{power}", difference_text(z, &centre))
             }
+            // A hinge is zero on one side of its start.
             LawShape::Hinge { from, side, power } => {
                 let over = if from == 0.0 {
                     z.to_owned()
@@ -449,12 +488,14 @@ impl LawFormula {
                     n => format!("({ramp})^{n}"),
                 }
             }
+            // Both phases, since the phase is estimated linearly.
             LawShape::Wave { pitch } => {
                 let pitch = self.constant("pitch", pitch, factor);
                 return ["sin", "cos"]
                     .map(|f| format!("{f}(2*pi*{z}/{pitch})"))
                     .to_vec();
             }
+            // A smooth bump at one position.
             LawShape::Bump { centre, width } => {
                 format!(
                     "exp(-({})^2)",
@@ -465,9 +506,11 @@ impl LawFormula {
                 let near = self.scaled_distance(z, centre, width, factor);
                 format!("{near}*exp(-({near})^2)")
             }
+            // A smooth step between two levels.
             LawShape::Step { centre, width } => {
                 format!("tanh({})", self.scaled_distance(z, centre, width, factor))
             }
+            // A force that decays away from zero and changes sign there, as Stribeck friction does over the rate.
             LawShape::Fading { scale, halves } => {
                 let scale = self.constant("scale", scale, factor);
                 let power = match halves {
@@ -477,6 +520,7 @@ impl LawFormula {
                 };
                 format!("sign({z})*exp(-{power})")
             }
+            // Friction that builds up over a distance; its name is that of the friction model.
             LawShape::Memory { length, curve } => {
                 let state = if curve == 1 { "dahl" } else { "bouc_wen" };
                 format!("{state}({z}, {})", self.constant("length", length, factor))
@@ -490,6 +534,7 @@ impl LawFormula {
 
     /// `(z - centre)/width`
     fn scaled_distance(&mut self, z: &str, centre: f64, width: f64, factor: LawFactor) -> String {
+        // A centre at zero is left out.
         let from = if centre == 0.0 {
             z.to_owned()
         } else {

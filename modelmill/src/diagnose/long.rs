@@ -1,8 +1,8 @@
-//! Long recordings in fewer samples. If the parallel filter keeps few samples, states are decimated and forces filtered before any column
-//! is computed. This saves memory and time.
+//! Long recordings in fewer samples. If the parallel filter keeps few samples, states are decimated and forces
+//! filtered before any column is computed. This saves memory and time.
 //!
-//! Smoothed states change little between samples. This first step leaves four samples for each one that the parallel filter keeps,
-//! which it needs to filter regressor and forces alike.
+//! Smoothed states change little between samples. This first step leaves four samples for each one that the
+//! parallel filter keeps, which it needs to filter regressor and forces alike.
 //!
 //! Decision: a diagnosis holds some thousand columns. Beyond 150 000 samples the parallel filter keeps one of four,
 //! and 20 000 at most, unless that would remove more than three quarters of the band in which forces follow the
@@ -23,13 +23,13 @@ const KEPT: usize = 12_000;
 const PART_OF_BAND: f64 = 0.25;
 /// Samples that are left for each one that the parallel filter keeps.
 const LEFT: usize = 4;
-/// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes: one with ripples
-/// would change the forces relative to the states, which are not filtered.
+/// Order of the low-pass of the forces. It is Butterworth's, which is flat where the parallel filter passes:
+/// one with ripples would change the forces relative to the states, which are not filtered.
 const ORDER: usize = 4;
 
 impl PreparedRecording {
-    /// The recording with long segments in the fewer samples that a diagnosis uses. Use it to save memory if the recording is needed for
-    /// nothing else.
+    /// The recording with long segments in the fewer samples that a diagnosis uses. Use it to save memory if
+    /// the recording is needed for nothing else.
     ///
     /// Fails if a segment cannot be filtered.
     pub fn for_diagnosis(&self, model: &Model) -> Outcome<Self> {
@@ -39,6 +39,8 @@ impl PreparedRecording {
 }
 
 /// A segment in fewer samples, if it is long and the parallel filter keeps few of them.
+///
+/// Fails when a column is too short for the filter.
 pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<RecordingSegment> {
     let (samples, every) = (stretch.samples(), stretch.decimation());
     let time = &stretch.run.time;

@@ -1,5 +1,6 @@
-//! Candidates for Dahl friction (P. R. Dahl, AIAA Journal 14, 1976): after each reversal it builds up over a distance, like bristles
-//! that bend before they slip. It depends on the earlier motion, so a model file cannot contain it.
+//! Candidates for Dahl friction (P. R. Dahl, AIAA Journal 14, 1976): after each reversal it builds up over a
+//! distance, like bristles that bend before they slip. It depends on the earlier motion, so a model file cannot
+//! contain it.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -21,6 +22,8 @@ const LENGTHS: [f64; 12] = [
 ];
 
 /// Dahl friction of every drive.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn dahl_candidates(
     model: &Model,
     all: &SegmentList<'_>,
@@ -48,12 +51,14 @@ pub(crate) fn dahl_candidates(
             continue;
         }
         let lengths = LENGTHS.map(|part| part * travel);
+        // The states of all distances are computed together, to evaluate the positions once.
         let of_lengths = stack(all, |one| {
             let position = &positions(one)?[d];
             Ok(lengths
                 .map(|length| bristle_states(position, length))
                 .to_vec())
         })?;
+        // The search tries one distance after the other.
         let choice = |(length, states): (f64, Vec<f64>)| {
             let mut column = ForceColumn(vec![None; drives.len()]);
             column.0[d] = Some(states);
@@ -84,8 +89,8 @@ pub(crate) fn dahl_candidates(
     Ok(candidates)
 }
 
-/// The state of the bristles along a position, between -1 and 1, by `dz/dx = (sign - z) / length`. Each step uses the exact solution of
-/// this equation, so large steps are stable.
+/// The state of the bristles along a position, between -1 and 1, by `dz/dx = (sign - z) / length`. Each step
+/// uses the exact solution of this equation, so large steps are stable.
 fn bristle_states(position: &[f64], length: f64) -> Vec<f64> {
     let mut state = 0.0_f64;
     let mut before = position.first().copied().unwrap_or(0.0);

@@ -1,5 +1,5 @@
-//! Values along all recordings of a diagnosis: forces, variables and motions of places. Recordings are stacked one after the other, and
-//! all columns are decimated alike.
+//! Values along all recordings of a diagnosis: forces, variables and motions of places. Recordings are stacked
+//! one after the other, and all columns are decimated alike.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{SampleLayout, SampleSegment as LaidOut};
@@ -28,6 +28,7 @@ pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
         }
     };
     let all_count = (all.iter()).all(|(one, _)| one.run.left_out.iter().flatten().all(|out| !out));
+    // A decimated sample is left out if its filter used an excluded force.
     let of_drive = |drive: usize| {
         let of = |(one, _): &(&RecordingSegment, bool)| -> Vec<bool> {
             let kept = 0..one.time().len();
@@ -97,10 +98,13 @@ pub(crate) struct PlaceMotions {
 
 impl PlaceMotions {
     /// Evaluates all motions once.
+    ///
+    /// Fails when a pose has no solution.
     pub(crate) fn new(model: &Model, all: &SegmentList<'_>) -> Outcome<Self> {
         let evaluator = ModelEvaluator::new(&model.derivation);
         let (active, passive) = model.derivation.coordinates();
         let drives = stack_states(all, model, |states| evaluator.drive_motion(states))?;
+        // Without passive coordinates there is nothing to compute.
         let passive_motion = if passive.is_empty() {
             Vec::new()
         } else {
@@ -142,6 +146,7 @@ impl PlaceMotions {
             }
             _ => None,
         };
+        // The scale of searched constants: largest rate, and travel.
         let largest = |values: &[f64]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let travel = |values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -153,6 +158,8 @@ impl PlaceMotions {
 }
 
 /// Values of a function of the states along all recordings, one after the other, without decimation.
+///
+/// Fails when a pose has no solution.
 fn stack_states(
     all: &SegmentList<'_>,
     model: &Model,
@@ -161,6 +168,7 @@ fn stack_states(
     ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();
+    // The first block determines the number of columns.
     for (one, _) in all {
         one.for_each_block(model, |states| {
             Ok::<_, Error>(evaluate(states).map(|columns| {

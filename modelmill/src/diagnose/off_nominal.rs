@@ -1,4 +1,5 @@
-//! Base parameters whose estimates differ from the nominal values, and a warning if no physical body could have their sign.
+//! Base parameters whose estimates differ from the nominal values, and a warning if no physical body could have
+//! their sign.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, OptionName, Remedy};
@@ -46,13 +47,14 @@ pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalPa
     off
 }
 
-/// A warning about base parameters whose sign no bodies near those of the file can have. Then not the bodies are wrong, but a
-/// direction: of gravity, a length, a drive or a column.
+/// A warning about base parameters whose sign no bodies near those of the file can have. Then not the bodies
+/// are wrong, but a direction: of gravity, a length, a drive or a column.
 pub(super) fn reversed_sign_note(
     version: &ModelVersion,
     off: &[OffNominalParameter],
 ) -> Option<RecordingNote> {
     let model = &version.model;
+    // A sign counts only if the estimate is clear and about as large as the nominal value.
     let has_turned = |off: &&OffNominalParameter| {
         let p = &off.parameter;
         let is_other = p.value * off.nominal < 0.0
@@ -83,8 +85,9 @@ pub(super) fn reversed_sign_note(
     )))
 }
 
-/// Whether a base parameter has the same sign for all bodies whose parameters are within a factor of those of the file. First moments
-/// and products of inertia may have either sign, since a small shift of the centre of mass can change it.
+/// Whether a base parameter has the same sign for all bodies whose parameters are within a factor of those of
+/// the file. First moments and products of inertia may have either sign, since a small shift of the centre of
+/// mass can change it.
 fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let derivation = &version.model.derivation;
     let mechanism = &derivation.mechanism;
@@ -113,6 +116,7 @@ fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
         turned * BODY_PARAMETER_FACTOR.powf(random.uniform(-2.0, 2.0).clamp(-1.0, 1.0))
     };
     (0..SIGN_TRIALS).all(|_| {
+        // All parameters vary at once; one trial with the other sign is enough.
         let parameters = (0..mechanism.parameters.len()).map(|i| size(i) * factor(i));
         let parameters: Vec<f64> = parameters.collect();
         derivation.base_values(&parameters, &constants)[k] * nominal > 0.0

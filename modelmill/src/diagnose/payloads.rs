@@ -1,5 +1,6 @@
-//! Candidates for a payload on every body of the model: a tool, a workpiece, a forgotten cover. They are tried only if base
-//! parameters are fixed, as from an unloaded run; estimated base parameters would absorb a payload.
+//! Candidates for a payload on every body of the model: a tool, a workpiece, a forgotten cover. They are tried
+//! only if base parameters are fixed, as from an unloaded run; estimated base parameters would absorb a
+//! payload.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
@@ -29,14 +30,18 @@ const PARAMETERS: [(&str, &str, SignConstraint); 7] = [
 const POINT_MASS_PARAMETERS: usize = 4;
 
 /// For every body a point mass, and the same with second moments.
+///
+/// Fails when the derivation of the columns fails, or when a pose has no solution.
 pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
     let payloads = PayloadColumns::new(model)?;
     let columns = regressor(all, &ModelEvaluator::new(&payloads.derivation), model)?;
+    // The size of the machine bounds the distance of the payload.
     let reach = reach(&model.derivation.mechanism);
     let largest = columns.iter().map(size).fold(0.0, f64::max);
     let mut candidates = Vec::new();
     // The last body first: of two with the same effect it is the one that carries tools.
     for (frame, which) in payloads.frames.iter().zip(&payloads.columns).rev() {
+        // Columns at the level of rounding are zero.
         let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
             let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
@@ -63,6 +68,7 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
             (POINT_MASS_PARAMETERS, "point_mass"),
             (PARAMETERS.len(), "payload"),
         ] {
+            // Parameters without effect are not estimated.
             let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {
                 let (symbol, unit, sign) = PARAMETERS[*k];
@@ -103,6 +109,7 @@ fn size(column: &ForceColumn) -> f64 {
 /// Largest distance between two frames in the nominal pose, m; it bounds the distance of a payload from its frame.
 pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
     let nominal: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
+    // Free joints are at their nominal values.
     let poses = Kinematics::new(mechanism).poses(&nominal);
     let origins: Vec<[f64; 3]> = poses.frames().iter().map(|pose| pose.origin).collect();
     let distance = |a: &[f64; 3], b: &[f64; 3]| -> f64 {

@@ -32,6 +32,7 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
     };
     let mut spots = Vec::new();
     let mut driven = Vec::new();
+    // Drives come first, since most effects act on them.
     for (d, drive) in mechanism
         .drives
         .iter()
@@ -53,6 +54,7 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
             spots.push(spot(&coordinate.name, carries, ActsOn::Coordinate, place));
         }
     }
+    // Points, bodies, base and force signals follow.
     for (i, point) in mechanism.points.iter().enumerate() {
         let place = EffectPlace::Point(PointIdx(i));
         spots.push(spot(&point.name, PlaceLoad::Mass, ActsOn::Point, place));
@@ -130,17 +132,18 @@ pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     })
 }
 
-/// Sets of places at which a kind may act with shared parameters, and how each is to be written: one effect at all of them,
-/// or the sum of effects at each.
+/// Sets of places at which a kind may act with shared parameters, and how each is to be written: one effect at
+/// all of them, or the sum of effects at each.
 ///
-/// Each place alone; pairs for kinds that need two; and in machines with loops, whose sides are often alike, all drives, all
-/// passive joints and all active ones.
+/// Each place alone; pairs for kinds that need two; and in machines with loops, whose sides are often alike,
+/// all drives, all passive joints and all active ones.
 pub(crate) fn place_sets<'a>(
     mechanism: &Mechanism,
     kind: &EffectKind,
     spots: &[&'a CandidatePlace],
     all: &'a [CandidatePlace],
 ) -> (Vec<Vec<&'a CandidatePlace>>, Vec<Vec<usize>>) {
+    // A kind with a second place: each place with each other one of the right motion.
     if let Some(motion) = kind.other {
         let moves = |spot: &&&CandidatePlace| {
             matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate)
@@ -156,6 +159,7 @@ pub(crate) fn place_sets<'a>(
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
+    // Mechanics between two points, such as springs.
     if let Some(joined) = kind.mechanics.and_then(|one| one.pairs(mechanism)) {
         let at = |point: PointIdx| {
             spots
@@ -167,6 +171,7 @@ pub(crate) fn place_sets<'a>(
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
+    // Kinds for two drives of equal unit.
     if kind.places == Some(2) {
         let mut pairs = Vec::new();
         for (i, one) in spots.iter().enumerate() {
@@ -180,12 +185,14 @@ pub(crate) fn place_sets<'a>(
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();
         return (pairs, sets);
     }
+    // Mechanics that join places, such as rods at both sides of a loop.
     let places: Vec<EffectPlace> = spots.iter().map(|spot| spot.place).collect();
     if let Some(groups) = (kind.mechanics).and_then(|one| one.groups(mechanism, &places)) {
         let sets = (0..groups.len()).map(|k| vec![k]).collect();
         let of_group = |group: Vec<usize>| group.into_iter().map(|i| spots[i]).collect();
         return (groups.into_iter().map(of_group).collect(), sets);
     }
+    // All other kinds: each place alone, and groups of places that are built alike.
     let singles: Vec<Vec<&CandidatePlace>> = spots.iter().map(|spot| vec![*spot]).collect();
     let mut sets: Vec<Vec<usize>> = (0..singles.len()).map(|k| vec![k]).collect();
     // Waves along the travel differ in their phase, even at places that are alike otherwise.

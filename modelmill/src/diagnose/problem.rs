@@ -1,11 +1,11 @@
-//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is an [`Answer`] with
-//! the problem, the diagnosis and the candidates.
+//! States the search for missing effects in numbers and solves it. Input are a model and recordings, output is a
+//! [`DiagnosisSolution`] with the problem, the diagnosis and the candidates.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
     CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
-    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, ROUNDING, diagnose, drift_candidates,
-    reading_fault_candidates, white_noise,
+    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose,
+    drift_candidates, reading_fault_candidates, white_noise,
 };
 
 use crate::along::drive_rates;
@@ -66,14 +66,17 @@ impl DiagnosisSolution {
 pub(crate) struct DiagnosisQuery<'a> {
     /// Which parameters keep their nominal values.
     pub fixed: FixedParameters,
-    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal values: there every wrong
-    /// value of a body would look like a payload.
+    /// Whether to search for payloads, laws and alternatives too. Not in the second diagnosis with nominal
+    /// values: there every wrong value of a body would look like a payload.
     pub in_full: bool,
     /// Differences between the recordings.
     pub run_differences: &'a [RecordingDifference],
 }
 
 /// Finds the effects that a model lacks; `fit` are the fitted recordings, `check` the validation runs.
+///
+/// Fails when all forces are zero, when samples are too few, when a pose has no solution, and when a job is
+/// cancelled.
 pub(crate) fn find_missing_effects(
     model: &Model,
     fit: &[RecordingSegment],
@@ -81,6 +84,7 @@ pub(crate) fn find_missing_effects(
     asked: DiagnosisQuery<'_>,
 ) -> Outcome<DiagnosisSolution> {
     let held = asked.fixed;
+    // Stage 1: derive all candidates and evaluate their columns.
     let candidates = model
         .host()
         .run_job("deriving all candidates", 0, |_| candidates(model))??;
@@ -94,6 +98,7 @@ pub(crate) fn find_missing_effects(
                 problem(&candidates, model, &all)
             })??;
     let mut origins = made.origins;
+    // Stage 2: fixed parameters and known faults are subtracted from the forces.
     let other_friction = match held {
         FixedParameters::All => held_friction::changes(model, &problem.base),
         FixedParameters::Known => Vec::new(),
@@ -108,6 +113,7 @@ pub(crate) fn find_missing_effects(
     let mut further = reading_fault_candidates(&problem);
     further.extend(drift_candidates(&problem, &units));
     further.extend(dahl_candidates(model, &all)?);
+    // Stage 3: candidates that need the derivatives of the forces by the motion.
     let values = encoders::values(model, &problem, held);
     let slopes = encoders::sensitivities(model, &all, &values);
     further.extend(encoders::zeros(model, &slopes));
@@ -121,6 +127,7 @@ pub(crate) fn find_missing_effects(
     problem.candidates.extend(further);
     // None of these can be an entry of a model file.
     origins.resize(problem.candidates.len(), None);
+    // Stage 4: the search, which requests further columns while it runs.
     let supply = ColumnSupply {
         candidates: &candidates,
         origins: &origins,
@@ -133,6 +140,7 @@ pub(crate) fn find_missing_effects(
         .run_job("searching for missing effects", 0, |_| {
             diagnose(&mut problem, &supply)
         })?;
+    // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);
     }
@@ -153,6 +161,7 @@ pub(crate) fn find_missing_effects(
 
 /// Completes a disturbance: the units of its place, and a sentence.
 fn describe_disturbance(one: &mut Disturbance, model: &Model) {
+    // A disturbance of a drive has the unit of its force.
     let drives = model.drives();
     let place = one.at.first();
     let drive = drives.iter().position(|drive| Some(drive) == place);
@@ -182,6 +191,7 @@ struct ColumnSupply<'a> {
 
 impl ColumnProvider for ColumnSupply<'_> {
     fn columns_for_constant(&self, candidate: usize, constant: f64) -> Option<Vec<ForceColumn>> {
+        // Candidates without an entry have no searched constant.
         let (k, felt) = self.origins[candidate].as_ref()?;
         let entry = &self.candidates.entries[*k];
         let columns = refined_columns(self.candidates, self.model, self.all, entry, constant)?;
@@ -199,6 +209,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         load: &ForceColumn,
         which: LoadDependentQuery,
     ) -> Vec<(usize, ColumnChoice)> {
+        // Either all candidates or one of them, with a given value of its constant.
         let only = match which {
             LoadDependentQuery::All => None,
             LoadDependentQuery::One(candidate, _) => {
@@ -218,6 +229,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         let made =
             load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
         let made = made.unwrap_or_default();
+        // From entries back to candidates of the problem.
         let place = |entry: usize| {
             let is_its =
                 |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
@@ -235,12 +247,15 @@ fn grid_middle(grid: &[f64]) -> Vec<f64> {
 }
 
 /// The problem in numbers, with all columns of the base.
+///
+/// Fails when all forces are zero, when samples are too few, or when a pose has no solution.
 fn problem(
     candidates: &DerivedCandidates,
     model: &Model,
     all: &SegmentList<'_>,
 ) -> Outcome<(DiagnosisProblem, columns::CandidateColumns)> {
     let measured = stack(all, |one| Ok(one.run.measured_forces()?.to_vec()))?;
+    // Forces that are all zero come from a recording without them.
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
         return Err(Error::input(zero_force_message(
@@ -258,7 +273,9 @@ fn problem(
             )));
         }
     }
+    // The noise and the layout come from the recordings, the columns from the model.
     let mut made = columns::candidate_columns(candidates, model, all)?;
+    // A row without drive whose force is zero has no noise and no friction.
     let undriven = model
         .derivation
         .mechanism
@@ -289,8 +306,8 @@ fn is_fixed(model: &Model, held: FixedParameters, k: usize) -> bool {
     held == FixedParameters::All || model.is_known(k)
 }
 
-/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the base, with their standard
-/// deviations as prior.
+/// Subtracts the forces of fixed parameters from the measured ones. Parameters of an earlier fit stay in the
+/// base, with their standard deviations as prior.
 fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedParameters) {
     let is_held = |k: usize| is_fixed(model, held, k);
     let fitted: Vec<usize> = (0..model.base.len())
@@ -311,6 +328,7 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
             is_part_of_load.push(problem.base_is_part_of_load[k]);
         }
     }
+    // The columns of a tilt change with the base, and are split in the same way.
     for candidate in &mut problem.candidates {
         if let ColumnSource::Tilt(tilt) = &mut candidate.source {
             for change in &mut tilt.components {
@@ -335,6 +353,8 @@ fn fix_parameters(problem: &mut DiagnosisProblem, model: &Model, held: FixedPara
 }
 
 /// Columns of viscous friction, dry friction and an offset of every drive, in this order.
+///
+/// Fails when a pose has no solution.
 fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     let rates = stack(all, |one| drive_rates(model, one))?;
     let mut friction = Vec::new();
@@ -351,7 +371,10 @@ fn friction(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<ForceColumn>> {
     Ok(friction)
 }
 
-/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all recorded samples bounds it.
+/// White noise of each force, N or N m. After decimation motion may look like noise, so the noise of all
+/// recorded samples bounds it.
+///
+/// Fails when a recording has no forces.
 fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64>> {
     let mut noises = Vec::with_capacity(measured.len());
     for (d, kept) in measured.iter().enumerate() {
@@ -368,5 +391,5 @@ fn noise_levels(measured: &[Vec<f64>], all: &SegmentList<'_>) -> Outcome<Vec<f64
 fn noise(force: &[f64]) -> f64 {
     let squares = force.iter().map(|f| f * f).sum::<f64>();
     let size = (squares / force.len().max(1) as f64).sqrt();
-    white_noise(force).max(ROUNDING * size)
+    white_noise(force).max(FORCE_ROUNDING * size)
 }

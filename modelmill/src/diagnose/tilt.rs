@@ -13,8 +13,11 @@ use crate::regressors::{SegmentList, regressor};
 /// Constants of a tilt, about x, y and z.
 pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 
-/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which a tilt has an
-/// effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both directions, are exact.
+/// Derivative of each base column by gravity along each axis of the base (per m/s^2), and the axes about which
+/// a tilt has an effect. Forces are linear in gravity, so two evaluations for each axis, with gravity in both
+/// directions, are exact.
+///
+/// Fails when a pose has no solution.
 pub(crate) fn tilt(
     derivation: &Derivation,
     model: &Model,
@@ -33,8 +36,10 @@ pub(crate) fn tilt(
     if size == 0.0 {
         return Ok(tilt);
     }
+    // The reduction of the model without tilt decides which columns are needed.
     let own = &model.derivation.reduction;
     for (axis, component) in tilt.components.iter_mut().enumerate() {
+        // The base is turned so that gravity points along the axis, in either direction.
         let along = |sign: f64| {
             let mut constants = usual.clone();
             let angles = angles_to(gravity.map(|g| sign * g / size), axis);
@@ -50,6 +55,7 @@ pub(crate) fn tilt(
                 model,
             )
         };
+        // Half the difference of both directions is the part that changes with gravity.
         let [before, after] = [along(-1.0)?, along(1.0)?];
         component.fixed = ForceColumn(vec![None; model.drives().len()]);
         // The base columns in the order of the model.
@@ -69,6 +75,7 @@ pub(crate) fn tilt(
             component.base.push(change);
         }
     }
+    // Only axes about which a tilt changes the forces are tried.
     let every = TiltCandidate {
         axes: vec![0, 1, 2],
         ..tilt.clone()
@@ -95,6 +102,7 @@ fn angles_to(direction: [f64; 3], axis: usize) -> [f64; 3] {
     // Any vector that is not along it completes the frame.
     let other = Vector3::ith(along.iamin(), 1.0);
     let next = along.cross(&other).normalize();
+    // The three vectors are the columns of a rotation.
     let mut turn = Matrix3::zeros();
     turn.set_column(axis, &along);
     turn.set_column((axis + 1) % 3, &next);

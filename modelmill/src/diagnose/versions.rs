@@ -43,14 +43,17 @@ impl ForceComparison {
 }
 
 impl ModelVersion {
-    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the diagnosis. If all parameters are
-    /// fixed, the nominal values are used.
+    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the
+    /// diagnosis. If all parameters are fixed, the nominal values are used.
+    ///
+    /// Fails when the identification fails, or when a pose has no solution.
     pub fn new(
         model: Model,
         fit: Vec<RecordingSegment>,
         check: Vec<RecordingSegment>,
         held: FixedParameters,
     ) -> Outcome<Self> {
+        // Fixed parameters leave nothing to identify.
         let identified = match held {
             FixedParameters::All => None,
             FixedParameters::Known => {
@@ -61,6 +64,7 @@ impl ModelVersion {
                 Some(identify::identify(&model, &fit, &[], &check, &estimators)?)
             }
         };
+        // Base parameters of the fit, or nominal ones.
         let values = match &identified {
             Some(result) => result.values(),
             None => model.nominal.clone(),

@@ -1,8 +1,8 @@
-//! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are values of a
-//! diagnosis, output is English text without line breaks.
+//! Sentences for people: verdict, effects with their places, disturbances, and reasons of rejection. Input are
+//! values of a diagnosis, output is English text without line breaks.
 
 use modelmill_identify::diagnose::{
-    DiagnosisVerdict, Disturbance, LocatedEffect, ModelDiagnosis, ROUNDING, SelectionStep,
+    DiagnosisVerdict, Disturbance, FORCE_ROUNDING, LocatedEffect, ModelDiagnosis, SelectionStep,
 };
 
 use crate::audit::SUSPICIONS;
@@ -50,6 +50,7 @@ pub fn effect(effect: &LocatedEffect) -> String {
 /// Effects as a list for a sentence: `x, y and z`.
 pub fn effects(effects: &[LocatedEffect]) -> String {
     let all: Vec<String> = effects.iter().map(effect).collect();
+    // The last effect is joined by `and`.
     match all.as_slice() {
         [] => "nothing".to_owned(),
         [one] => one.clone(),
@@ -57,11 +58,13 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
     }
 }
 
-/// The effects that a step of the ladder added and dropped.
+/// The effects that a step of the selection added and dropped.
 pub fn rung(rung: &SelectionStep) -> String {
+    // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {
         return "the model as it is".to_owned();
     }
+    // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
     says.extend(rung.added.iter().map(|one| format!("+ {}", effect(one))));
     says.extend(rung.dropped.iter().map(|one| format!("− {}", effect(one))));
@@ -70,11 +73,12 @@ pub fn rung(rung: &SelectionStep) -> String {
 
 /// Whether a noise floor, relative to the force, is no more than the rounding of the recorded numbers.
 fn is_rounding(noise_floor: f64) -> bool {
-    noise_floor <= NOISE_FREE_ROUNDINGS * ROUNDING
+    noise_floor <= NOISE_FREE_ROUNDINGS * FORCE_ROUNDING
 }
 
 /// The noise floor as a sentence; errors are compared with it.
 pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
+    // Errors are compared with this figure.
     let floor = percent(Some(diagnosis.noise_floor));
     if is_rounding(diagnosis.noise_floor) {
         format!("The forces are noise-free: errors below {floor} are rounding.")
@@ -83,8 +87,8 @@ pub fn noise_floor_text(diagnosis: &ModelDiagnosis) -> String {
     }
 }
 
-/// The noise floor as a label: `noise in the forces`, or `rounding` if the forces are noise-free. `noise_floor` is relative to
-/// the force.
+/// The noise floor as a label: `noise in the forces`, or `rounding` if the forces are noise-free. `noise_floor`
+/// is relative to the force.
 pub fn floor_label(noise_floor: f64) -> &'static str {
     if is_rounding(noise_floor) {
         "rounding"
@@ -93,10 +97,12 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
     }
 }
 
-/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and `has_effects` says whether
-/// the diagnosis found any effect. A reason without a sentence of its own is returned unchanged.
+/// Why a candidate was rejected, as a sentence for people; `reason` is the word of the search, and
+/// `has_effects` says whether the diagnosis found any effect. A reason without a sentence of its own is
+/// returned unchanged.
 pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
+        // Words of the search at the left, sentences at the right.
         "sign" => "its value would have the wrong sign",
         "explains nothing that is left" if has_effects => {
             "redundant: the effects found already explain it"
@@ -115,8 +121,9 @@ pub fn refusal(reason: &str, has_effects: bool) -> &str {
     }
 }
 
-/// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model, which effects were
-/// found and how the error falls, which part of the residual stays unexplained, disturbances in the recordings.
+/// The verdict with figures. The order of the sentences: what may be wrong with the recording or the model,
+/// which effects were found and how the error falls, which part of the residual stays unexplained, disturbances
+/// in the recordings.
 ///
 /// `channels` are the names of the drives.
 pub fn verdict(
@@ -125,13 +132,16 @@ pub fn verdict(
     judged: ValidationMethod,
 ) -> String {
     let ladder = &diagnosis.steps;
+    // Without steps there is no verdict.
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
         return String::new();
     };
     let noise = noise_floor_text(diagnosis);
     let found: Vec<LocatedEffect> = diagnosis.effects.iter().map(|f| f.effect.clone()).collect();
+    // The first step is the model as it is, the last one has all effects.
     let falls = error_reduction_text(first, last, channels, judged);
     let them = if found.len() == 1 { "it" } else { "them" };
+    // Each verdict states the error and compares it with the noise.
     let says = match diagnosis.verdict {
         DiagnosisVerdict::Adequate => format!(
             "The model is adequate: its error {} is {} of the force. {noise} No effect of the library lowers this error.",
@@ -144,6 +154,7 @@ pub fn verdict(
         ),
         DiagnosisVerdict::Unexplained => {
             let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
+            // Drives with a residual that a model could explain.
             let sits: Vec<String> = (diagnosis.unexplained.iter())
                 .map(|d| {
                     format!(
@@ -170,12 +181,13 @@ pub fn verdict(
             }
         }
     };
+    // Suspicions come first, since they may make the verdict wrong.
     let all = [first_checks(diagnosis), Some(says), disturbances(diagnosis)];
     all.into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
-/// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small drive would
-/// otherwise be hidden by the others.
+/// How the error falls: of all drives, or, if that hardly changes, of the drive whose error falls most. A small
+/// drive would otherwise be hidden by the others.
 fn error_reduction_text(
     first: &SelectionStep,
     last: &SelectionStep,
@@ -188,6 +200,7 @@ fn error_reduction_text(
         let share = |(before, after): &(&f64, &f64)| **after / before.max(f64::MIN_POSITIVE);
         share(a).total_cmp(&share(b))
     });
+    // The total is used unless it hides the drive.
     let (of, before, after) = match most {
         Some((channel, (before, after)))
             if last.check > HARDLY_LOWER * first.check && after < before =>
@@ -204,7 +217,8 @@ fn error_reduction_text(
     )
 }
 
-/// Suspicions about the recording or the model, which must be checked before any effect is believed; `None` without any.
+/// Suspicions about the recording or the model, which must be checked before any effect is believed; `None`
+/// without any.
 fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
     let says: Vec<&str> = suspicions
@@ -230,6 +244,7 @@ fn is_suspicion(one: &Disturbance) -> bool {
 
 /// Disturbances of the recordings by name, each kind once with all its places; `None` without any.
 fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
+    // Kinds in the order of their first disturbance.
     let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
     for one in diagnosis.disturbances.iter().filter(|d| !is_suspicion(d)) {
         let places = one.at.iter().map(String::as_str);
@@ -241,6 +256,7 @@ fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
     let named: Vec<String> = kinds
         .into_iter()
         .map(|(name, mut at)| {
+            // Places keep their order.
             let mut seen = std::collections::HashSet::new();
             // A drive may have the same disturbance in several recordings.
             at.retain(|place| seen.insert(*place));
@@ -262,6 +278,7 @@ fn disturbances(diagnosis: &ModelDiagnosis) -> Option<String> {
 /// A disturbance as a sentence without the last full stop; sizes have units.
 pub fn disturbance(one: &Disturbance) -> String {
     let at = one.at.join(", ");
+    // The value of an estimate with its unit, rounded for a sentence.
     let value = |name: &str| {
         let found = one.estimates.iter().find(|value| value.name == name);
         found.map_or_else(String::new, |q| {
@@ -270,6 +287,7 @@ pub fn disturbance(one: &Disturbance) -> String {
                 .to_owned()
         })
     };
+    // All estimates with standard deviations, for kinds without a sentence of their own.
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
             let deviation = q.standard_deviation;
@@ -281,6 +299,7 @@ pub fn disturbance(one: &Disturbance) -> String {
         .collect();
     let all = all.join(", ");
     match one.kind.as_str() {
+        // Each kind says what it is and what follows for the model.
         "coloured_noise" => format!(
             "{at} has slow noise of {}, mostly below about {}. It does not repeat when the machine passes the same state, so no model \
              can explain it",
@@ -292,6 +311,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             value("step")
         ),
         "outliers" => {
+            // The share of the samples has no unit.
             let share = one.estimates.iter().find(|value| value.name == "share");
             format!(
                 "{at} has outliers: {} of the samples, {} rms. The fit ignores them",
@@ -300,6 +320,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             )
         }
         "periodic_in_time" => {
+            // A hum may have several frequencies.
             let frequencies = one
                 .estimates
                 .iter()
@@ -346,6 +367,7 @@ pub fn disturbance(one: &Disturbance) -> String {
 pub fn lines(text: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = vec![String::new()];
     for word in text.split_whitespace() {
+        // Words are appended to the last line as long as they fit.
         let line = lines.len() - 1;
         let line = &mut lines[line];
         if !line.is_empty() && line.chars().count() + 1 + word.chars().count() > letters {

@@ -1,4 +1,4 @@
-//! Limits on the command line, which join those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
+//! Limits given as options, which extend those of the model file or replace them: `theta1=1.5:2.1`, `theta1_d=1.2`,
 //! `spindle_left=1500`, `R3m.x=0.2:0.7`, `singularity=0.3`.
 
 use modelmill_boundary::message;
@@ -13,22 +13,35 @@ use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
 use crate::text::table::significant;
 
-/// One limit of the command line.
+/// One limit that was given as an option.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrajectoryLimit {
+    /// The limited quantity: a coordinate, its rate or acceleration, a drive, an axis of a point, or
+    /// `singularity`.
     name: String,
-    /// As it is written.
+    /// The single number, if one was given; NaN for a range.
     value: f64,
+    /// Lower and upper end, SI units.
     ends: [f64; 2],
 }
 
 impl TrajectoryLimit {
-    /// Reads `NAME=SIZE` or `NAME=LOW:HIGH`.
+    /// Reads `NAME=SIZE`, which is the range from -SIZE to SIZE, or `NAME=LOW:HIGH`.
+    ///
+    /// Fails with the expected form, as text.
+    ///
+    /// ```
+    /// use modelmill::excite::TrajectoryLimit;
+    ///
+    /// assert!(TrajectoryLimit::parse("theta1=1.5:2.1").is_ok());
+    /// assert!(TrajectoryLimit::parse("theta1=2.1:1.5").is_err());
+    /// ```
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
             "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned()
         };
         let (name, range) = text.split_once('=').ok_or_else(expected)?;
+        // Numbers must be finite, so that a range has an end.
         let number = |text: &str| {
             let value: Option<f64> = text.trim().parse().ok();
             value.filter(|v| v.is_finite()).ok_or_else(expected)
@@ -53,10 +66,14 @@ impl TrajectoryLimit {
     }
 }
 
-/// The model file's limits with those of the command line put in.
+/// The model file's limits, with the given ones added or in their place.
+///
+/// Fails when a name is unknown, or a range is not possible for its quantity.
 pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<MotionLimits> {
     let mechanism = &model.derivation.mechanism;
     let mut limits = mechanism.limits.clone();
+    // A name may be a singularity, a point with an axis, a drive, or a coordinate with its
+    // derivatives.
     for limit in given {
         let name = limit.name.as_str();
         if name == "singularity" {
@@ -71,6 +88,7 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
             && let Some(axis) = AXES.iter().position(|a| *a == axis)
             && let Some(i) = mechanism.points.iter().position(|p| p.name == point)
         {
+            // An axis of a point that has limits on other axes keeps these.
             let known = limits.points.iter_mut().find(|(p, _)| p.0 == i);
             match known {
                 Some((_, ranges)) => ranges[axis] = Some(limit.ends),
@@ -90,6 +108,10 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
     Ok(limits)
 }
 
+/// Sets a limit of a coordinate, of its rate (`_d`) or of its acceleration (`_dd`).
+///
+/// Fails when there is no such coordinate, when a rate of a passive coordinate is limited, or when the range of
+/// a rate excludes 0.
 fn set_coordinate_limit(
     model: &Model,
     limits: &mut MotionLimits,
@@ -97,7 +119,9 @@ fn set_coordinate_limit(
 ) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
+    // The option is repeated in every message of this limit.
     let this = Remedy::option(OptionName::Limits).with_value(name);
+    // The suffix selects position, rate or acceleration.
     let (stem, derivative) = match (name.strip_suffix("_dd"), name.strip_suffix("_d")) {
         (Some(stem), _) => (stem, 2),
         (None, Some(stem)) => (stem, 1),
@@ -117,18 +141,20 @@ fn set_coordinate_limit(
             model.drives().join(", ")
         )));
     };
+    // Rates of passive coordinates follow from the active ones.
     if coordinates[i].passive && derivative > 0 {
         return Err(Error::input(message!(
-            "{}: `{stem}` is passive, and only its position can be limited; limit rates of active coordinates",
+            "{}: `{stem}` is passive, and only its position can be limited; limit the rates of active coordinates",
             this
         )));
     }
     if derivative > 0 && !(limit.ends[0] < 0.0 && limit.ends[1] > 0.0) {
         return Err(Error::input(message!(
-            "{}: the range must contain 0, for periodic motion turns back; one number means both directions",
+            "{}: the range must contain 0, since periodic motion reverses; one number sets both directions",
             this
         )));
     }
+    // A coordinate without limits gets an entry.
     let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
     let k = position.unwrap_or_else(|| {
         limits.coordinates.push((
@@ -142,23 +168,26 @@ fn set_coordinate_limit(
     Ok(())
 }
 
-/// Limits in which active coordinates without a range of positions have that of recordings, with the rates and accelerations
-/// there: what a machine has done it can do again. A note says so.
+/// Adds recorded ranges to limits: active coordinates without a range of positions get that of the recordings, with
+/// their rates and accelerations. What a machine has done it can do again. A note states the ranges.
 pub(crate) fn with_recorded_ranges(
     model: &Model,
     mut limits: MotionLimits,
     recordings: &[&PreparedRecording],
 ) -> (MotionLimits, Option<RecordingNote>) {
+    // Ranges are taken over all segments.
     let [recordings, _] = recording::segments(model, recordings, &[]);
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
     let mut says = Vec::new();
     for (k, i) in active.iter().enumerate() {
+        // Limits of the file or of the options have priority.
         let known = limits.coordinates.iter().position(|(c, _)| c.0 == *i);
         let mut one = known.map(|k| limits.coordinates[k].1).unwrap_or_default();
         if one.position.is_some() {
             continue;
         }
+        // Range of a derivative over all recordings.
         let range = |order: usize| {
             let runs = recordings.iter().map(|stretch| &stretch.run);
             let values = runs.flat_map(|run| &[&run.q, &run.qd, &run.qdd][order][k]);
@@ -166,11 +195,13 @@ pub(crate) fn with_recorded_ranges(
                 [low.min(*x), high.max(*x)]
             })
         };
+        // A coordinate that never moved stays without limits.
         let [low, high] = range(0);
         if low >= high {
             continue;
         }
         one.position = Some([low, high]);
+        // Rates and accelerations get a range that is symmetric about zero.
         let around_zero = |order: usize| {
             let [low, high] = range(order);
             let most = high.max(-low);
@@ -191,10 +222,11 @@ pub(crate) fn with_recorded_ranges(
             coordinates[*i].name, ends[0], ends[1]
         ));
     }
+    // The note shows how to allow more.
     let note = (!says.is_empty()).then(|| {
         RecordingNote::info(message!(
-            "{} has no limits for positions; motion keeps within what was recorded: {}, and within the largest rates and \
-             accelerations there; {}, or {}, allows more.",
+            "{} has no limits for positions. The motion stays within the recorded ranges: {}, and within the largest recorded \
+             rates and accelerations. Set wider limits with {} or {}.",
             model.path,
             says.join(", "),
             Remedy::option(OptionName::Limits),
@@ -207,10 +239,13 @@ pub(crate) fn with_recorded_ranges(
     (limits, note)
 }
 
-/// Limits of the active coordinates, in their order; each must have a range of positions.
+/// Limits of the active coordinates, in their order.
+///
+/// Fails when one of them has no range of positions.
 pub fn active_limits(model: &Model, limits: &MotionLimits) -> Outcome<Vec<ExcitationLimits>> {
     let (active, _) = model.derivation.coordinates();
     let coordinates = &model.derivation.mechanism.coordinates;
+    // Rates and accelerations may be unlimited, positions may not.
     let of_one = |i: &usize| {
         let found = limits.coordinates.iter().find(|(c, _)| c.0 == *i);
         let limits = found.map(|(_, limits)| *limits).unwrap_or_default();
@@ -228,7 +263,7 @@ pub fn active_limits(model: &Model, limits: &MotionLimits) -> Outcome<Vec<Excita
         .collect();
     if let Some(first) = missing.first() {
         return Err(Error::input(message!(
-            "{}: the positions of {} have no limits, and excitation would grow without end; add \
+            "{}: the positions of {} have no limits, and excitation would grow without bound; add \
              `[limits.coordinates]` with `{first} = {{ position = [low, high], rate = ..., acceleration = ... }}` to the \
              model file, or give {}",
             model.path,

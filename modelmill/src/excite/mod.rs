@@ -1,5 +1,5 @@
-//! `excite`: the periodic trajectory that tells the base parameters apart best, eq. (14), (15) and (17), or that tells an
-//! effect from what it may be taken for.
+//! `excite`: the periodic trajectory that determines the base parameters best, eq. (14), (15) and (17), or that
+//! distinguishes an effect best from its alternatives.
 
 pub mod limits;
 pub mod plant;
@@ -28,16 +28,16 @@ pub use modelmill_identify::excite::{ExcitationCriterion, Options};
 use plant::ModelPlant;
 pub use separated::SeparationResult;
 
-/// What is asked of an excitation; [`Request::default`] is the paper's, with samples at 500 Hz.
+/// A request for an excitation. [`ExcitationRequest::default`] has the settings of the paper, with samples at 500 Hz.
 #[derive(Clone, Debug)]
 pub struct ExcitationRequest {
-    /// The search: harmonics, period, criterion, how many trajectories are tried, seed.
+    /// The search: harmonics, period, criterion, number of trajectories, seed.
     pub options: Options,
-    /// Samples per second of the trajectory, Hz.
+    /// Sampling rate of the trajectory, Hz.
     pub rate: f64,
-    /// Limits beside those of the model file, or in their place.
+    /// Limits in addition to those of the model file, or in their place.
     pub limits: Vec<TrajectoryLimit>,
-    /// Instead of exciting the base parameters, tell effects apart.
+    /// Effects to distinguish; if given, they are the goal of the search instead of the base parameters.
     pub separate: Option<SeparationRequest>,
 }
 
@@ -52,30 +52,30 @@ impl Default for ExcitationRequest {
     }
 }
 
-/// Effects that are to be told apart.
+/// Effects that the motion must distinguish.
 #[derive(Clone, Debug)]
 pub struct SeparationRequest {
-    /// The effect that is to differ most, with values of its parameters and constants, SI units.
+    /// The effect whose force must differ most, with values of its parameters and constants, SI units.
     pub effect: NamedEffect,
-    /// What it may be taken for. Constants without a value are fitted like parameters.
+    /// Its alternatives: effects with which it may be confused. Constants without a value are fitted like parameters.
     pub from: Vec<NamedEffect>,
-    /// What is there in either case and the model file lacks.
+    /// Effects that are present in both cases and missing in the model file.
     pub common_effects: Vec<NamedEffect>,
-    /// Standard deviation of the noise in the forces, N or N m, against which the difference is held.
+    /// Standard deviation of the noise in the forces, N or N m, as the scale of the difference.
     pub noise: Option<f64>,
 }
 
-/// A trajectory that was found.
+/// The result of a search.
 pub struct ExcitationResult {
-    /// What the JSON calls the model.
+    /// Name of the model in the JSON.
     pub model: String,
-    /// Coefficients, condition numbers, and how close the trajectory comes to its limits.
+    /// The trajectory: coefficients, condition numbers, and its distance from the limits.
     pub found: ExcitationTrajectory,
-    /// How it was searched for.
+    /// The options of the search.
     pub options: Options,
-    /// By how much effects differ along it, where that was asked for.
+    /// The difference of the effects along it, if effects were to be distinguished.
     pub separated: Option<SeparationResult>,
-    /// Condition number with columns of equal norm.
+    /// Condition number of the regressor with columns of equal norm; `None` if there is none.
     pub scaled: Option<f64>,
     /// Times of one period, s.
     pub time: Vec<f64>,
@@ -85,15 +85,17 @@ pub struct ExcitationResult {
     pub coordinates: Vec<String>,
     /// A picture of the trajectory (SVG).
     pub picture: String,
-    /// Remarks.
+    /// Notes on limits and effects.
     pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// Searches for the periodic trajectory within limits that tells the base parameters apart best, or effects; `recordings`
-    /// are compared with when effects are told apart, and give their size and the noise where these are not given.
+    /// Searches for the periodic trajectory within limits that determines the base parameters, or distinguishes
+    /// effects, best. `recordings` provide ranges of motion, and the size of the effect and the noise if these are
+    /// not given; the result is compared with them.
     ///
-    /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion tells the effects apart.
+    /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion distinguishes the
+    /// effects.
     pub fn excite(
         &self,
         request: &ExcitationRequest,
@@ -101,19 +103,22 @@ impl Model {
     ) -> Outcome<ExcitationResult> {
         if free_bodies(&self.derivation.mechanism).next().is_some() {
             return Err(Error::input(format!(
-                "{}: motion is planned for joints, and this model has a body that hangs on nothing; plan with the body held, \
-                 its frame fixed to the base",
+                "{}: motion is planned for joints, but this model has a free body; fix the body to the base and plan \
+                 the motion of the joints",
                 self.path
             )));
         }
+        // Options replace limits of the model file; recordings fill in what both leave open.
         let (all_limits, as_recorded) = limits::with_recorded_ranges(
             self,
             limits::merged_limits(self, &request.limits)?,
             recordings,
         );
         let coordinates = limits::active_limits(self, &all_limits)?;
+        // The criterion of the options is replaced if effects are the goal.
         let mut options = request.options.clone();
         let plant = ModelPlant::new(self, &all_limits);
+        // Effects that no motion can distinguish are refused before the search.
         let asked = match &request.separate {
             Some(asked) => Some(separated::prepare_separation(
                 self,
@@ -128,6 +133,7 @@ impl Model {
         let of_asked = asked.iter().flat_map(|asked| asked.notes.clone());
         let notes = as_recorded.into_iter().chain(of_asked).collect();
         let separating = asked.as_ref().map(|asked| asked.plant(&plant, self));
+        // The goal of the search: effects, or else the unknown base parameters.
         if separating.is_some() {
             options.criterion = ExcitationCriterion::Separation;
         } else if !plant.has_unknowns() {
@@ -140,6 +146,7 @@ impl Model {
             Some(separating) => separating,
             None => &plant,
         };
+        // The search reports progress for each trajectory.
         let found = self
             .host()
             .run_job(
@@ -154,6 +161,7 @@ impl Model {
             // Picoseconds are enough, and 7.288 reads better than 7.287999999999999.
             .map(|i| (1e12 * i as f64 * options.period / samples as f64).round() / 1e12)
             .collect();
+        // The samples of the file decide how far the effects differ, not those of the search.
         let apart = match &separating {
             Some(separating) => {
                 let apart = separating.distance_along(&motion, &separating.which);
@@ -162,6 +170,7 @@ impl Model {
             None => None,
         };
         drop(separating);
+        // The result keeps the task, for its texts.
         let separated = match (asked, apart) {
             (Some(asked), Some(apart)) => Some(SeparationResult {
                 distance: apart,
@@ -174,14 +183,16 @@ impl Model {
             }),
             _ => None,
         };
+        // The title of the picture names the goal.
         let title = match &separated {
-            Some(separated) => format!("{}: tells {}", self.name, separated.task.description()),
+            Some(separated) => format!("{}: separates {}", self.name, separated.task.description()),
             None => format!(
                 "{}: excitation with condition number {}",
                 self.name,
                 significant(found.condition_number, 4)
             ),
         };
+        // The scaled condition number is computed along the samples of the file.
         let scaled = plant
             .regressor(&motion)
             .filter(|w| w.ncols() > 0)
@@ -202,16 +213,16 @@ impl Model {
     }
 }
 
-/// Why a rate of so many samples per second does not do.
+/// The error of a sampling rate that is too low to show the difference.
 fn too_slow(model: &Model, rate: f64) -> Error {
     Error::input(message!(
-        "{}: nothing is left of the difference at {rate} samples per second; give a higher rate ({})",
+        "{}: the difference of the effects is lost at {rate} samples per second; give a higher rate ({})",
         model.path,
         Remedy::option(OptionName::Rate)
     ))
 }
 
-/// Samples over one period.
+/// Number of samples of one period, at least 1.
 fn samples_per_period(rate: f64, period: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
@@ -223,7 +234,7 @@ fn samples_per_period(rate: f64, period: f64) -> usize {
 }
 
 impl ExcitationResult {
-    /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations.
+    /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations, SI units.
     pub fn csv(&self) -> String {
         let motion = [
             ("", &self.motion.q),
@@ -243,7 +254,8 @@ impl ExcitationResult {
     }
 }
 
-/// Positions around their means, rates, accelerations and the nominal model's forces.
+/// The picture of a trajectory (SVG): positions around their means, rates, accelerations and the nominal model's
+/// forces.
 fn picture(
     model: &Model,
     plant: &ModelPlant<'_>,
@@ -254,6 +266,7 @@ fn picture(
 ) -> String {
     let names = model.active_coordinates();
     let mut figure = SvgFigure::new(title, time);
+    // Positions are drawn around their means, which the title states.
     let around: Vec<Vec<f64>> = motion
         .q
         .iter()
@@ -265,6 +278,7 @@ fn picture(
         .zip(&found.series)
         .map(|(name, series)| format!("{name} {}", significant(series.offset, 4)))
         .collect();
+    // One panel for each kind of quantity, with one curve for each coordinate.
     let mut panel = |title: &str, columns: &[Vec<f64>], names: &[String]| {
         let curves: Vec<(&str, &[f64])> = names
             .iter()
@@ -281,6 +295,7 @@ fn picture(
     };
     let title = format!("position around the mean ({}), {unit}", means.join(", "));
     panel(&title, &around, &names);
+    // Units of derivatives, also if coordinates have different units.
     let per = |seconds: &str| {
         unit.replace("rad", &format!("rad/{seconds}"))
             .replace('m', &format!("m/{seconds}"))
@@ -291,6 +306,7 @@ fn picture(
         &motion.qdd,
         &names,
     );
+    // Forces of the nominal model show whether the drives can follow.
     if let Some(forces) = plant.forces(motion) {
         panel(
             "force of the nominal model, N or N m",

@@ -1,7 +1,8 @@
-//! A model whose motion is to tell effects apart: an effect, what it may be taken for, and what is fitted in any case go
-//! in; along a motion or a recording comes out by how much they differ.
+//! Difference of effects along a motion. An effect, its alternatives, and the effects of both cases go in; their
+//! distance along a motion or a recording comes out.
 //!
-//! Columns come from where the diagnosis has them, so that kinds of one's own are told apart like all others.
+//! Columns are computed as the diagnosis computes them, so that kinds from the user's libraries are treated like all
+//! others.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -21,56 +22,65 @@ use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
-use modelmill_identify::diagnose::ROUNDING;
+use modelmill_identify::diagnose::FORCE_ROUNDING;
 
-/// What is to be told apart, derived.
+/// The effects to be distinguished, derived.
 pub(crate) struct SeparationSetup {
-    /// The effect with its constants.
+    /// The effect with fixed constants.
     truth: ChosenEffect,
-    /// The effect as it would be fitted, where constants of it are searched for.
+    /// The effect as it would be fitted, if constants of it are searched for.
     fitted: Option<ChosenEffect>,
-    /// What it may be taken for.
+    /// Its alternatives.
     pub rivals: Vec<RivalEffect>,
-    /// What is there in either case.
+    /// Effects that are present in both cases.
     common_effects: Vec<ChosenEffect>,
-    /// Values of the effect's parameters by symbol; of either sign if none is given.
+    /// Values of the effect's parameters by symbol; without any, each parameter is 1 and may have either sign.
     sizes: Vec<(String, f64)>,
-    /// Noise of each drive's force; all alike if it is not known.
+    /// Noise of each drive's force, N or N m; `None` if unknown, which means equal.
     noise: Option<Vec<f64>>,
 }
 
-/// What an effect may be taken for.
+/// An alternative of the effect.
 pub(crate) struct RivalEffect {
+    /// The alternative with its constants.
     chosen: ChosenEffect,
-    /// Whether the effect holds it as a special case, so that nothing tells when the rival is true.
+    /// Whether the alternative is a special case of the effect, so that forces cannot show that the alternative is
+    /// true.
     pub is_special_case: bool,
 }
 
 impl RivalEffect {
+    /// Kind and places.
     pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.chosen.named.effect
     }
 }
 
-/// How far effects are apart along a motion.
+/// The distance of effects along a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectDistance {
+    /// Force of the effect and of its residuals, rms over all drives.
     pub figures: SeparationMeasure,
-    /// The rival that is nearest, by its position, and its constants.
+    /// Index of the nearest alternative.
     pub rival: usize,
+    /// Constants of the nearest alternative.
     pub constants: Vec<(String, f64)>,
-    /// The smaller of both directions that can be told at all.
+    /// The distance, rms over all drives, N or N m: the smaller of both directions, as far as these can be determined.
     pub force: f64,
 }
 
 impl SeparationSetup {
-    /// Derives what the command line names.
+    /// Derives the effects: the one to be distinguished, its alternatives `from`, and those that are present in both
+    /// cases.
+    ///
+    /// Fails when an effect is unknown or named twice.
     pub(crate) fn new(
         model: &Model,
         separate: &NamedEffect,
         from: &[NamedEffect],
         beside: &[NamedEffect],
     ) -> Outcome<Self> {
+        // Each effect may be named once only.
         let all: Vec<&NamedEffect> = std::iter::once(separate)
             .chain(from)
             .chain(beside)
@@ -78,7 +88,7 @@ impl SeparationSetup {
         for (k, one) in all.iter().enumerate() {
             if all[..k].iter().any(|known| is_same_effect(known, one)) {
                 return Err(Error::input(message!(
-                    "{} is named twice; {}, {} and {} take different effects",
+                    "{} is named twice; {}, {} and {} need different effects",
                     words::effect(&one.effect),
                     Remedy::option(OptionName::Separate),
                     Remedy::option(OptionName::From),
@@ -86,9 +96,11 @@ impl SeparationSetup {
                 )));
             }
         }
+        // Constants of alternatives are searched, those of other effects are fixed.
         let choose =
             |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
         let truth = choose(separate, ConstantPolicy::Usual)?;
+        // A tilt of the base has sizes for its angles, which are constants of its kind.
         let parameters = &truth.kind.parameters;
         let is_size = |symbol: &str| {
             truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt)
@@ -100,7 +112,7 @@ impl SeparationSetup {
             of.any(|c| c.search == Some(modelmill_spec::ConstantSearch::Linear))
         };
         let mut sizes: Vec<(String, f64)> = separate.values.clone();
-        // A constant beside which the effect is linear is found as a product with its parameter.
+        // A constant in which the effect is linear is estimated as a product with its parameter.
         for (symbol, value) in &separate.values {
             for (parameter, size) in &separate.values {
                 if is_linear(symbol) && is_size(parameter) {
@@ -109,6 +121,7 @@ impl SeparationSetup {
             }
         }
         sizes.retain(|(symbol, _)| is_size(symbol) || symbol.contains('*'));
+        // An effect with searched constants is fitted over their ranges.
         let is_searched = |c: &modelmill_spec::KindConstant| {
             matches!(c.search, Some(modelmill_spec::ConstantSearch::Range { .. }))
         };
@@ -116,10 +129,12 @@ impl SeparationSetup {
             effect: separate.effect.clone(),
             values: Vec::new(),
         };
+        // A tilt has no searched constants.
         let is_tilt = truth.kind.mechanics == Some(modelmill_spec::Mechanics::Tilt);
         let fitted = (!is_tilt && truth.kind.constants.iter().any(is_searched))
             .then(|| choose(&free, ConstantPolicy::Searched))
             .transpose()?;
+        // Whether an alternative is a special case is found later, along random motions.
         let rivals = from
             .iter()
             .map(|named| {
@@ -143,39 +158,41 @@ impl SeparationSetup {
         })
     }
 
-    /// The effect that is to be told from the others.
+    /// The effect that is to be distinguished.
     pub(crate) fn effect(&self) -> &LocatedEffect {
         &self.truth.named.effect
     }
 
-    /// Values of its parameters; none if they are not known.
+    /// Values of its parameters by symbol; empty if they are unknown.
     pub(crate) fn sizes(&self) -> &[(String, f64)] {
         &self.sizes
     }
 
-    /// Effects that are there in either case.
+    /// Effects that are present in both cases.
     pub(crate) fn common_effects(&self) -> impl Iterator<Item = &LocatedEffect> {
         self.common_effects.iter().map(|one| &one.named.effect)
     }
 
-    /// One noise for all drives.
+    /// Sets the same noise for all drives, N or N m.
     pub(crate) fn set_noise(&mut self, size: f64, drives: usize) {
         self.noise = Some(vec![size; drives]);
     }
 
-    /// Noise of all drives together, if it is known.
+    /// The rms of the noise over all drives, N or N m, if it is known.
     pub(crate) fn noise(&self) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let squares: f64 = noise.iter().map(|n| n * n).sum();
         Some((squares / noise.len().max(1) as f64).sqrt())
     }
 
-    /// Takes from recordings what is not known: the noise, and the size of the effect by a fit beside the base.
+    /// Estimates from recordings what is not given: the noise, and the size of the effect by a fit together with the
+    /// base.
     pub(crate) fn estimate_from_recordings(
         &mut self,
         model: &Model,
         data: &[RecordingSegment],
     ) -> Outcome {
+        // Forces of all recordings are joined drive by drive.
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
             let forces = crate::along::measured_forces(one)?;
@@ -184,11 +201,12 @@ impl SeparationSetup {
                 whole.extend(force);
             }
         }
+        // Noise below rounding of the forces is not possible.
         if self.noise.is_none() {
             let noise = |force: &Vec<f64>| {
                 let squares: f64 = force.iter().map(|f| f * f).sum();
                 let size = (squares / force.len().max(1) as f64).sqrt();
-                white_noise(force).max(ROUNDING * size)
+                white_noise(force).max(FORCE_ROUNDING * size)
             };
             let noise: Vec<f64> = measured.iter().map(noise).collect();
             self.noise = noise.iter().all(|n| *n > 0.0).then_some(noise);
@@ -196,13 +214,14 @@ impl SeparationSetup {
         if !self.sizes.is_empty() {
             return Ok(());
         }
+        // The size is fitted together with the base parameters, weighted by the noise.
         let runs: Vec<(&RecordingSegment, bool)> = data.iter().map(|one| (one, false)).collect();
         let samples = measured.first().map_or(0, Vec::len);
         let Some(terms) = self.separation_columns(model, &runs)? else {
             return Ok(());
         };
         let weights = self.weights(model.drives().len());
-        // What is known is taken off.
+        // The force of known parameters is subtracted.
         let mut forces = ForceColumn::new(measured);
         forces.add(-1.0, &terms.known);
         let forces = matrix(&[forces], &weights, samples);
@@ -221,7 +240,7 @@ impl SeparationSetup {
         Ok(())
     }
 
-    /// Rows are divided by their noise relative to that of all.
+    /// Weights of the rows of each drive: the mean noise divided by its own.
     fn weights(&self, drives: usize) -> Vec<f64> {
         match (&self.noise, self.noise()) {
             (Some(noise), Some(all)) => noise.iter().map(|n| all / n).collect(),
@@ -229,7 +248,7 @@ impl SeparationSetup {
         }
     }
 
-    /// Columns along recordings; `None` if the effect has none.
+    /// Columns of all effects along segments; `None` if the effect has no force there.
     fn separation_columns(
         &self,
         model: &Model,
@@ -239,6 +258,7 @@ impl SeparationSetup {
         let Some((candidate, choices)) = self.truth.candidate(model, runs, &load)? else {
             return Ok(None);
         };
+        // Effects of both cases are fitted like base parameters.
         for one in &self.common_effects {
             if let Some((_, choices)) = one.candidate(model, runs, &load)? {
                 columns.extend(choices.into_iter().flat_map(|choice| choice.columns));
@@ -255,8 +275,8 @@ impl SeparationSetup {
         }))
     }
 
-    /// How far the effects are apart along recordings, from the rivals of some positions; `None` if the effect has no force
-    /// there.
+    /// The distance of the effects along segments, for the alternatives with the indices `which`; `None` if the
+    /// effect has no force there.
     pub(crate) fn distance_along(
         &self,
         model: &Model,
@@ -269,6 +289,7 @@ impl SeparationSetup {
             return Ok(None);
         };
         let weights = self.weights(model.drives().len());
+        // All columns become matrices with weighted rows.
         let of = |columns: &[ForceColumn]| matrix(columns, &weights, samples);
         let (candidate, columns) = &terms.truth;
         let fitted = match &self.fitted {
@@ -279,12 +300,13 @@ impl SeparationSetup {
             Some((_, choices)) => choices.iter().map(|c| of(&c.columns)).collect(),
             None => vec![of(columns)],
         };
+        // An alternative with searched constants has one column set for each choice.
         let mut owners: Vec<(usize, Vec<(String, f64)>)> = Vec::new();
         let mut rivals = Vec::new();
         for k in which {
             let rival = &self.rivals[*k].chosen;
             let found = rival.candidate(model, &runs, &terms.load)?;
-            // What has no effect mimics nothing.
+            // An alternative without force explains nothing.
             let choices = found.map_or_else(
                 || {
                     vec![ColumnChoice {
@@ -305,6 +327,7 @@ impl SeparationSetup {
             fitted,
             rivals,
         });
+        // A special case is distinguished in one direction only.
         Ok(figures.map(|figures| {
             let (rival, constants) = owners[figures.rival].clone();
             let force = if self.rivals[rival].is_special_case {
@@ -321,11 +344,12 @@ impl SeparationSetup {
         }))
     }
 
-    /// The effect's force: its columns times their values, or each by itself in units where no value is known.
+    /// The effect's force: its columns times their values, or each column in its own unit if no value is known.
     fn force(&self, candidate: &CandidateEffect, columns: &DMatrix<f64>) -> DMatrix<f64> {
         if self.sizes.is_empty() {
             return columns.clone();
         }
+        // Products of parameters have their own size.
         let value = |symbol: &str| {
             let known = self.sizes.iter().find(|(known, _)| known == symbol);
             known.map_or(0.0, |(_, value)| *value)
@@ -336,7 +360,7 @@ impl SeparationSetup {
         columns * DMatrix::from_column_slice(values.len(), 1, &values)
     }
 
-    /// Parameters whose values are of a sign that makes no sense.
+    /// Symbols of parameters whose values have an impossible sign.
     pub(crate) fn wrong_signs(&self) -> Vec<&str> {
         let wrong = |symbol: &str, value: f64| {
             let parameter = self.truth.kind.parameters.iter();
@@ -357,7 +381,7 @@ impl SeparationSetup {
             .collect()
     }
 
-    /// Whether any force of an effect follows from nominal values.
+    /// Whether the force of any effect is computed from nominal values.
     pub(crate) fn needs_nominal(&self) -> bool {
         let rivals = self.rivals.iter().map(|rival| &rival.chosen);
         std::iter::once(&self.truth)
@@ -367,7 +391,7 @@ impl SeparationSetup {
     }
 }
 
-/// Whether both are one effect at the same places.
+/// Whether both effects have the same kind and the same places, in any order.
 fn is_same_effect(one: &NamedEffect, other: &NamedEffect) -> bool {
     one.effect.kind == other.effect.kind
         && one.effect.at.len() == other.effect.at.len()
@@ -378,19 +402,21 @@ fn is_same_effect(one: &NamedEffect, other: &NamedEffect) -> bool {
             .all(|place| other.effect.at.contains(place))
 }
 
-/// Columns of a pair.
+/// Columns of the effects along segments.
 struct SeparationColumns {
-    /// Of all that is fitted in any case.
+    /// Columns of base parameters and of effects that are present in both cases.
     base: Vec<ForceColumn>,
-    /// What the drives carry.
+    /// Load of the drives.
     load: ForceColumn,
-    /// What the model's known parameters say.
+    /// Force of the known parameters.
     known: ForceColumn,
+    /// The effect and its columns.
     truth: (CandidateEffect, Vec<ForceColumn>),
 }
 
-/// Columns with one drive below the other.
+/// Columns as a matrix, drive by drive, each drive multiplied by its weight.
 fn matrix(columns: &[ForceColumn], weights: &[f64], samples: usize) -> DMatrix<f64> {
+    // Drives are stacked below each other; a drive without force stays zero.
     let mut matrix = DMatrix::zeros(weights.len() * samples, columns.len());
     for (k, column) in columns.iter().enumerate() {
         for (d, (values, weight)) in column.0.iter().zip(weights).enumerate() {
@@ -404,17 +430,20 @@ fn matrix(columns: &[ForceColumn], weights: &[f64], samples: usize) -> DMatrix<f
     matrix
 }
 
-/// A model with limits whose motion tells effects apart.
+/// A model with limits for the search of a motion that distinguishes effects.
 pub(crate) struct SeparatingPlant<'a> {
+    /// The model with its limits.
     pub inner: &'a ModelPlant<'a>,
+    /// The same model.
     pub model: &'a Model,
+    /// The effects.
     pub pair: &'a SeparationSetup,
-    /// Rivals that can be told apart at all.
+    /// Indices of the alternatives that can be distinguished.
     pub which: Vec<usize>,
 }
 
 impl SeparatingPlant<'_> {
-    /// How far the effects are apart along a motion.
+    /// The distance of the effects along a motion; `None` if a pose has no solution or the effect has no force.
     pub(crate) fn distance_along(
         &self,
         motion: &ExcitationMotion,
@@ -427,7 +456,7 @@ impl SeparatingPlant<'_> {
 
 impl ExcitationPlant for SeparatingPlant<'_> {
     fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>> {
-        // Without anything to find there is no condition.
+        // Without unknown base parameters there is no condition number.
         self.inner
             .regressor(motion)
             .filter(|matrix| matrix.ncols() > 0)
@@ -447,7 +476,7 @@ impl ExcitationPlant for SeparatingPlant<'_> {
     }
 }
 
-/// A motion as a recording with the forces of the nominal model.
+/// A motion as a segment with the forces of the nominal model.
 fn recording(plant: &ModelPlant<'_>, motion: &ExcitationMotion) -> Option<RecordingSegment> {
     let samples = motion.q.first().map_or(0, Vec::len);
     Some(RecordingSegment {

@@ -1,5 +1,5 @@
-//! Telling effects apart: which effects can be told apart at all, by how much along the trajectory, and how
-//! many samples that takes.
+//! Planning of motions that distinguish effects: which effects can be distinguished at all, how much they differ
+//! along the trajectory, and how many samples that needs.
 
 use std::fmt::Write as _;
 
@@ -22,42 +22,46 @@ use super::SeparationRequest;
 use super::plant::ModelPlant;
 use super::separate::{EffectDistance, SeparatingPlant, SeparationSetup};
 
-/// Motions that are looked at before the search, for what no motion can tell.
+/// Number of random motions before the search, to detect effects that no motion can distinguish.
 const LOOKED_AT: usize = 24;
-/// A difference is plain from this many standard deviations on, all samples taken together. `diagnose` calls effects
+/// A difference is clear from this many standard deviations on, over all samples. `diagnose` calls effects
 /// indistinguishable below three.
 const PLAIN: f64 = 5.0;
 
-/// Effects that are to be told apart, ready for the search.
+/// Effects to be distinguished, prepared for the search.
 pub(crate) struct SeparationTask {
+    /// The effects.
     pub(crate) pair: SeparationSetup,
-    /// Recordings to compare with.
+    /// Segments of the recordings for comparison.
     data: Vec<RecordingSegment>,
-    /// Rivals that can be told apart at all.
+    /// Indices of the alternatives that can be distinguished.
     pub(crate) which: Vec<usize>,
-    /// Remarks.
+    /// Notes on the effects.
     pub(crate) notes: Vec<RecordingNote>,
 }
 
-/// By how much effects differ along a trajectory.
+/// The difference of effects along a trajectory.
 pub struct SeparationResult {
     /// The effects.
     pub(crate) task: SeparationTask,
-    /// Along the trajectory, with the samples of the file.
+    /// Along the trajectory, with the samples of its file.
     pub distance: EffectDistance,
-    /// Along the best of the random trajectories.
+    /// The distance along the best of the random trajectories, N or N m.
     pub random: f64,
-    /// Along the recordings that were given.
+    /// Along the given recordings; `None` without any.
     pub before: Option<EffectDistance>,
-    /// What forces are measured in.
+    /// Unit of the forces.
     pub unit: &'static str,
-    /// How many drives there are.
+    /// Number of drives.
     pub drives: usize,
-    /// Samples of one period.
+    /// Number of samples of one period.
     pub samples: usize,
 }
 
-/// Derives what is asked and looks at random motions for what cannot be told at all.
+/// Derives the requested effects, and evaluates random motions to find alternatives that cannot be distinguished.
+///
+/// Fails when the effect has no force, when base parameters absorb it, or when no alternative can
+/// be distinguished.
 pub(crate) fn prepare_separation(
     model: &Model,
     plant: &ModelPlant<'_>,
@@ -67,11 +71,12 @@ pub(crate) fn prepare_separation(
     recordings: &[&PreparedRecording],
 ) -> Outcome<SeparationTask> {
     let mut notes = Vec::new();
-    // Whoever watches hears a remark even where there is no answer in the end.
+    // The listener receives a note even if there is no result in the end.
     let mut note = |note: RecordingNote| {
         model.host().note(&note);
         notes.push(note);
     };
+    // Values, noise and recordings of the request.
     let mut pair = SeparationSetup::new(model, &asked.effect, &asked.from, &asked.common_effects)?;
     if let Some(size) = asked.noise {
         pair.set_noise(size, model.drives().len());
@@ -82,12 +87,14 @@ pub(crate) fn prepare_separation(
     }
     if let [first, ..] = pair.wrong_signs()[..] {
         note(RecordingNote::warning(format!(
-            "the value of `{first}` has a sign that makes no sense for `{}`",
+            "the value of `{first}` has a sign that is not possible for `{}`",
             pair.effect().kind
         )));
     }
+    // A difference that no random motion shows is taken as impossible.
     let motions = random_motions(plant, limits, options, LOOKED_AT)
         .map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
+    // Each alternative is tested alone along all random motions.
     let mut which = Vec::new();
     for k in 0..pair.rivals.len() {
         let probe = SeparatingPlant {
@@ -100,10 +107,11 @@ pub(crate) fn prepare_separation(
             .iter()
             .filter_map(|m| probe.distance_along(m, &[k]))
             .collect();
+        // An effect without force anywhere has missing nominal values, or is not in the load path.
         let name = words::effect(pair.effect());
         if all.is_empty() {
             let why = if pair.needs_nominal() {
-                "; its force follows from nominal values, which the model file must give"
+                "; its force is computed from nominal values, which the model file must give"
             } else {
                 ""
             };
@@ -112,18 +120,20 @@ pub(crate) fn prepare_separation(
                 model.path
             )));
         }
+        // What base parameters absorb along every motion cannot be found by any experiment.
         if all.iter().all(|one| one.figures.is_in_base()) {
             return Err(Error::input(format!(
-                "{}: base parameters take up {name} along every motion, so that no experiment finds it; it shows only as \
-                 values that are off their nominal ones",
+                "{}: base parameters absorb {name} along every motion, so that no experiment finds it; it appears only as \
+                 values that differ from the nominal ones",
                 model.path
             )));
         }
+        // An alternative that reproduces the effect along every motion is left out.
         if all.iter().all(|one| one.figures.is_mimicked()) {
             let rival = words::effect(pair.rivals[k].effect());
             note(RecordingNote::warning(message!(
-                "no motion tells {name} from {rival}, which can say all that it says beside the base parameters{}; it is left \
-                 out",
+                "no motion distinguishes {name} from {rival}, which explains the same forces together with the base parameters{}; \
+                 it is left out",
                 if pair.common_effects().next().is_some() {
                     message!(" and the effects of {}", Remedy::option(OptionName::Beside))
                 } else {
@@ -132,13 +142,15 @@ pub(crate) fn prepare_separation(
             )));
             continue;
         }
+        // If the effect explains the alternative along every motion, only one direction counts.
         pair.rivals[k].is_special_case = all.iter().all(|one| one.figures.can_explain_rival());
         which.push(k);
     }
+    // Without any alternative left there is no goal for the search.
     if which.is_empty() {
         return Err(Error::input(format!(
-            "{}: no experiment tells {} from {}; the simpler one is right until something else than forces speaks. Where \
-             only some values of the effect are the same, give others (NAME=VALUE behind a colon)",
+            "{}: no experiment distinguishes {} from {}; assume the simpler one unless other evidence contradicts it. If only \
+             some values of the effect are equivalent, give others (NAME=VALUE after a colon)",
             model.path,
             words::effect(pair.effect()),
             words::effects(
@@ -159,7 +171,7 @@ pub(crate) fn prepare_separation(
 }
 
 impl SeparationTask {
-    /// The plant for the search.
+    /// The model for the search.
     pub(crate) fn plant<'a>(
         &'a self,
         inner: &'a ModelPlant<'a>,
@@ -173,7 +185,7 @@ impl SeparationTask {
         }
     }
 
-    /// How far the effects are apart along the recordings.
+    /// The distance of the effects along the recordings; `None` without recordings.
     pub(crate) fn distance_along_recordings(
         &self,
         model: &Model,
@@ -184,17 +196,18 @@ impl SeparationTask {
         self.pair.distance_along(model, &self.data, &self.which)
     }
 
-    /// Samples of the recordings.
+    /// Number of samples of the recordings.
     fn samples(&self) -> usize {
         self.data.iter().map(|one| one.time().len()).sum()
     }
 
+    /// The alternatives that can be distinguished.
     fn rivals(&self) -> Vec<LocatedEffect> {
         let of = |k: &usize| self.pair.rivals[*k].effect().clone();
         self.which.iter().map(of).collect()
     }
 
-    /// Both sides in words.
+    /// The effect and its alternatives as text.
     pub(crate) fn description(&self) -> String {
         format!(
             "{} from {}",
@@ -204,11 +217,12 @@ impl SeparationTask {
     }
 }
 
-/// What forces of a model are measured in.
+/// Unit of the forces of a model, or of both kinds.
 pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
     let carries =
         |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
+    // The unit is common only if all drives have it.
     let forces = mechanism
         .drives
         .iter()
@@ -222,22 +236,24 @@ pub(crate) fn common_force_unit(model: &Model) -> &'static str {
 }
 
 impl SeparationResult {
-    /// The difference in standard deviations of the white noise, over some samples of each drive; `None` where the noise is
-    /// not known.
+    /// The difference in standard deviations of white noise, over some samples of each drive; `None` if the noise is
+    /// unknown.
     fn deviations(&self, apart: &EffectDistance, samples: usize) -> Option<f64> {
         let noise = self.task.pair.noise()?;
         Some(apart.force / noise * ((samples * self.drives) as f64).sqrt())
     }
 
-    /// Periods of the trajectory until the difference is plain, at least one.
+    /// Number of periods of the trajectory until the difference is clear, at least one; `None` if the noise is unknown.
     fn periods(&self) -> Option<f64> {
         let one = self.deviations(&self.distance, self.samples)?;
         Some((PLAIN / one).powi(2).ceil().max(1.0))
     }
 
-    /// All of it as one JSON object.
+    /// The result as one JSON object.
     pub fn json(&self) -> Value {
+        // Directions that a special case cannot show are null.
         let pair = &self.task.pair;
+        // Figures along a motion or a recording.
         let one = |apart: &EffectDistance, samples: usize| {
             let constants = apart.constants.iter().map(|(s, v)| (s.clone(), json!(v)));
             let is_held = pair.rivals[apart.rival].is_special_case;
@@ -256,6 +272,7 @@ impl SeparationResult {
                 "deviations": self.deviations(apart, samples),
             })
         };
+        // Alternatives that no motion distinguishes are listed separately.
         let left_out: Vec<&LocatedEffect> = (0..pair.rivals.len())
             .filter(|k| !self.task.which.contains(k))
             .map(|k| pair.rivals[k].effect())
@@ -276,7 +293,8 @@ impl SeparationResult {
         })
     }
 
-    /// For people.
+    /// The result as lines of text. `evaluations` is the number of evaluated trajectories, `random` that of random
+    /// ones.
     pub fn text(
         &self,
         evaluations: usize,
@@ -284,11 +302,15 @@ impl SeparationResult {
         spelling: &dyn RemedySpelling,
     ) -> Vec<String> {
         let pair = &self.task.pair;
-        let mut lines = vec![format!("  tells {}", self.task.description())];
+        let mut lines = vec![format!("  separates {}", self.task.description())];
         let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
         if !beside.is_empty() {
-            lines.push(format!("  beside {}", words::effects(&beside)));
+            lines.push(format!(
+                "  in addition to {} in both cases",
+                words::effects(&beside)
+            ));
         }
+        // The values of the effect scale all figures.
         let sizes: Vec<String> = (pair.sizes().iter())
             .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 5)))
             .collect();
@@ -298,9 +320,11 @@ impl SeparationResult {
         } else {
             format!("  with {}", sizes.join(", "))
         });
+        // One line for the recordings, one for the best random trajectory, one for the result.
         lines.push(String::new());
         let force = |value: f64| self.force(value);
         let row = |name: &str, apart: &EffectDistance, samples: usize| {
+            // The nearest alternative with the constants at which it is nearest.
             let nearest = pair.rivals[apart.rival].effect();
             let constants = apart.constants.iter();
             let constants: Vec<String> = constants
@@ -343,15 +367,16 @@ impl SeparationResult {
             &[
                 ("root mean square, all drives", ColumnAlignment::Left),
                 ("effect", ColumnAlignment::Right),
-                ("apart", ColumnAlignment::Right),
-                ("in deviations", ColumnAlignment::Right),
+                ("difference", ColumnAlignment::Right),
+                ("in std deviations", ColumnAlignment::Right),
                 ("nearest", ColumnAlignment::Left),
             ],
             &rows,
         ));
+        // The gain over random motions and recordings shows what the search achieved.
         let gain = self.distance.force / self.random;
         let mut says = format!(
-            "{} times as far apart as along the best random trajectory",
+            "the difference is {} times that of the best random trajectory",
             significant(gain, 3)
         );
         if let Some(before) = &self.before
@@ -359,7 +384,7 @@ impl SeparationResult {
         {
             let _ = write!(
                 says,
-                ", and {} times as far as in the recordings",
+                ", and {} times that of the recordings",
                 significant(self.distance.force / before.force, 3)
             );
         }
@@ -371,17 +396,18 @@ impl SeparationResult {
         lines
     }
 
+    /// A force with its unit.
     fn force(&self, value: f64) -> String {
         format!("{} {}", significant(value, 3), self.unit)
     }
 
-    /// What the figures mean.
+    /// Explanations of the figures.
     fn remarks(&self, spelling: &dyn RemedySpelling) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = indent_lines(&match (pair.noise(), self.periods()) {
             (Some(noise), Some(periods)) => format!(
-                "Against white noise of {} it takes {} for {PLAIN} standard deviations of all samples together; noise that \
-                 resembles itself takes longer, and `diagnose` tells what a recording is worth.",
+                "With white noise of {}, {} of recording makes the difference {PLAIN} standard deviations, over all samples. \
+                 Correlated noise needs longer; `diagnose` states how much information a recording contains.",
                 self.force(noise),
                 if periods > 1.0 {
                     format!("{periods} periods")
@@ -390,17 +416,18 @@ impl SeparationResult {
                 }
             ),
             _ => message!(
-                "With {}, or {}, it says how many periods it takes.",
+                "With {} or {} the number of required periods is computed.",
                 Remedy::option(OptionName::Noise).with_value("SIZE"),
                 Remedy::option(OptionName::Data).with_value("RUN")
             )
             .spell(spelling),
         });
+        // A special case is named, since forces cannot exclude the more general effect.
         for k in &self.task.which {
             let rival = &pair.rivals[*k];
             if rival.is_special_case {
                 lines.extend(indent_lines(&format!(
-                    "{} is a special case of {} here: if it is the true one, nothing but its simplicity tells.",
+                    "{} is a special case of {} here: if it is the true effect, both explain the forces, and only its simplicity favours it.",
                     words::effect(rival.effect()),
                     words::effect(pair.effect())
                 )));
@@ -410,7 +437,7 @@ impl SeparationResult {
     }
 }
 
-/// A sentence in lines.
+/// A sentence wrapped into indented lines.
 fn indent_lines(says: &str) -> Vec<String> {
     let lines = words::lines(says, 98);
     lines.iter().map(|line| format!("  {line}")).collect()

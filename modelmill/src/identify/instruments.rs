@@ -1,4 +1,4 @@
-//! Instruments for recordings: the motion that was asked for, or the same motion one period later.
+//! Instruments of instrumental-variable estimation: the reference motion, or the measured motion one period later.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -9,19 +9,21 @@ use crate::identify::options::{EquationWeights, EstimatorOptions};
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
 
-/// What stands in for the states against noise that runs through the controller.
+/// The source of instruments, against noise that is correlated with the states through the controller.
 #[derive(Clone, Copy, Default)]
 pub enum Instruments<'a> {
-    /// Nothing.
+    /// No instruments: least squares.
     #[default]
     None,
-    /// The states one period later, s.
+    /// The states one period later; the period in s.
     Period(f64),
-    /// Recordings of the motion that was asked for, one for each of the fit, in step with it.
+    /// Recordings of the reference motion, one for each recording of the fit, with the same times.
     Recordings(&'a [&'a PreparedRecording]),
 }
 
-/// One stretch of instruments for each of `data`; none if none are asked for.
+/// One segment of instruments for each of `data`; none without instruments.
+///
+/// Fails when the weights do not allow instruments, or when the times of the instruments differ.
 pub(crate) fn instrument_segments(
     data: &[RecordingSegment],
     instruments: &Instruments<'_>,
@@ -30,15 +32,17 @@ pub(crate) fn instrument_segments(
     if matches!(instruments, Instruments::None) {
         return Ok(Vec::new());
     }
+    // Weights from residuals would make the estimate depend on itself.
     if options.weights == EquationWeights::Channels {
         return Err(Error::options(message!(
-            "{} goes with {} or `variance`: weights from residuals would depend on the estimate that \
-             the instruments are to mend",
+            "{} needs {} or `variance`: weights from residuals would depend on the estimate that \
+             the instruments are to correct",
             Remedy::option(OptionName::Instruments),
             Remedy::option(OptionName::Weights).with_value("none")
         )));
     }
     match instruments {
+        // The first case has returned before.
         Instruments::None => Ok(Vec::new()),
         Instruments::Period(period) => data
             .iter()
@@ -55,11 +59,11 @@ pub(crate) fn instrument_segments(
     }
 }
 
-/// Fails unless instruments have the same times as the recordings.
+/// Fails unless the instruments have the same segments and times as the recordings.
 fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment]) -> Outcome {
     if data.len() != instruments.len() {
         return Err(Error::options(message!(
-            "{} gives {} for {} of {} (recordings count once for each stretch between gaps); give one for \
+            "{} gives {} for {} of {} (recordings count once for each segment between gaps); give one for \
              each, in the same order",
             Remedy::option(OptionName::Instruments),
             instruments.len(),
@@ -68,11 +72,13 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
         )));
     }
     for (own, theirs) in data.iter().zip(instruments) {
+        // Times are compared sample by sample, within a part of the smallest step.
         let (a, b) = (&own.run.time, &theirs.run.time);
         let step = a
             .windows(2)
             .map(|w| w[1] - w[0])
             .fold(f64::INFINITY, f64::min);
+        // Times may differ by rounding only.
         let apart = a
             .iter()
             .zip(b)
@@ -101,10 +107,14 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
     Ok(())
 }
 
-/// The same recording with the states of the next period, at its end with those of the one before.
+/// The recording with the states of the next period; near its end with those of the period before.
+///
+/// Fails when the recording is shorter than one and a half periods, or has no sample one period
+/// away.
 fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSegment> {
     let time = &data.run.time;
     let n = time.len();
+    // A period must fit into the recording one and a half times.
     let span = time
         .last()
         .zip(time.first())
@@ -117,7 +127,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
             data.run.file
         )));
     }
-    // By time, not by a number of samples, for steps may be uneven.
+    // By time, not by a number of samples, since steps may be uneven.
     let nearest = |t: f64| {
         let at = time.partition_point(|x| *x < t).clamp(1, n - 1);
         if t - time[at - 1] < time[at] - t {
@@ -126,6 +136,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
             at
         }
     };
+    // Near the end the period before is used.
     let mut places = Vec::with_capacity(n);
     for t in time {
         let wanted = if t + period <= time[n - 1] + 0.5 * step {
@@ -136,12 +147,13 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
         let at = nearest(wanted);
         if (time[at] - wanted).abs() > 0.75 * step {
             return Err(Error::input(format!(
-                "{}: there is no sample one period of {period} s away from t = {t} s; are there gaps?",
+                "{}: there is no sample one period of {period} s away from t = {t} s; check the recording for gaps",
                 data.run.file
             )));
         }
         places.push(at);
     }
+    // Positions, derivatives and forces are shifted together.
     let mut shifted = data.clone();
     let run = &mut shifted.run;
     let columns = run

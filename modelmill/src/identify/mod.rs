@@ -1,4 +1,4 @@
-//! `identify`: base parameters from recordings by least squares, with what they are worth.
+//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error figures.
 
 mod influence;
 mod instruments;
@@ -31,32 +31,33 @@ pub use options::{EquationWeights, EstimatorOptions};
 pub use refine::{EstimateRefinement, RefinementResult};
 use regression::{InstrumentStatistics, RegressionEstimate};
 
-/// Instruments whose smallest canonical correlation with the regressor is below this deserve a warning.
+/// Instruments are weak if their smallest canonical correlation with the regressor is below this value.
 const WEAK_INSTRUMENTS: f64 = 0.2;
 
-/// A fit with the figures that the nominal parameters have on the same recordings.
+/// A fit, with the figures of the nominal parameters on the same recordings.
 pub struct Identification {
-    /// The fit, as `--parameters` reads it.
+    /// The fit, in the form of a fit file.
     pub fit: FitFile,
-    /// Figures with nominal parameters on the recordings of the fit.
+    /// Error figures of the nominal parameters on the recordings of the fit.
     pub nominal_fit: ErrorFigures,
-    /// The same on the recordings of the check.
+    /// The same on the validation runs; `None` without any.
     pub nominal_check: Option<ErrorFigures>,
-    /// What the estimator found.
+    /// The estimate with its statistics.
     pub found: RegressionEstimate,
-    /// How it was asked.
+    /// The options of the estimator, with automatic choices made.
     pub options: EstimatorOptions,
-    /// What the user should know about the result; the fit holds it too.
+    /// Notes on the result; the fit contains them too.
     pub notes: Vec<RecordingNote>,
-    /// Periods and noise floors of periodic recordings, by their names.
+    /// Periods and noise floors of periodic recordings, with their file names.
     pub repeats: Vec<(String, RunRepeatability)>,
 }
 
 impl Model {
-    /// Identifies the base parameters from the recordings of `fit`, eq. (12), and holds the result against those of `check`.
+    /// Identifies the base parameters from the recordings of `fit`, eq. (12), and validates the result with those of
+    /// `check`.
     ///
-    /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording leads where the
-    /// mechanism cannot stand.
+    /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording contains a
+    /// pose that the mechanism cannot reach.
     pub fn identify(
         &self,
         fit: &[&PreparedRecording],
@@ -66,7 +67,22 @@ impl Model {
         self.identify_with(fit, &Instruments::None, check, options)
     }
 
-    /// As [`Model::identify`], by instrumental variables against noise that runs through the controller.
+    /// As [`Model::identify`], by instrumental variables, against noise that is correlated with the states through the
+    /// controller.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::identify::{EstimatorOptions, Instruments};
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let run = model.recording("run.csv", &RecordingOptions::default())?;
+    /// // The motion has a period of 8 s, so that the next period provides the instruments.
+    /// let instruments = Instruments::Period(8.0);
+    /// let fit = model.identify_with(&[&run], &instruments, &[], &EstimatorOptions::default())?;
+    /// println!("{:?}", fit.values());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn identify_with(
         &self,
         fit: &[&PreparedRecording],
@@ -75,16 +91,20 @@ impl Model {
         options: &EstimatorOptions,
     ) -> Outcome<Identification> {
         let recordings = fit;
+        // Segments are copied, since some of their equations may be excluded.
         let [mut fit, check] = recording::segments(self, fit, check);
+        // Equations at standstill are excluded before instruments are assigned.
         if let Some(part) = options.standstill {
             standstill::exclude_standstill(self, &mut fit, part)?;
         }
+        // Instruments must match the segments of the fit.
         let instruments = instruments::instrument_segments(&fit, instruments, options)?;
         let options = EstimatorOptions {
             weights: resolve_weights(self, &fit, &instruments, options.weights),
             ..options.clone()
         };
         let mut found = identify(self, &fit, &instruments, &check, &options)?;
+        // The influence of faults costs a second fit, which instruments do not support.
         if instruments.is_empty()
             && let Some(note) = influence::fault_influence(self, recordings, &found.found, &options)
         {
@@ -98,8 +118,8 @@ impl Model {
     }
 }
 
-/// What equations count where that is left open: each drive by its own residuals, where squares of different units would add
-/// up, and where nobody has said how a recording is prepared. Instruments do without.
+/// The weights if they are left open: by drive if drives have different units, so that squares of different units
+/// would be added, or if the preparation was chosen automatically. Instruments use none.
 fn resolve_weights(
     model: &Model,
     data: &[RecordingSegment],
@@ -110,6 +130,7 @@ fn resolve_weights(
         return weights;
     }
     let drives = model.drives().len();
+    // Squares of N and N m must not be added without weights.
     let differ = (1..drives).any(|d| model.force_unit(d) != model.force_unit(0));
     let chosen = data.iter().any(|one| one.run.prepared.decimate_chosen);
     if instruments.is_empty() && drives > 1 && (differ || chosen) {
@@ -119,7 +140,9 @@ fn resolve_weights(
     }
 }
 
-/// Identifies a model from some recordings and holds it against others.
+/// Identifies a model from some segments and validates it with others.
+///
+/// Fails when the equations cannot be solved, when a pose has no solution, or when it is cancelled.
 pub fn identify(
     model: &Model,
     data: &[RecordingSegment],
@@ -128,9 +151,12 @@ pub fn identify(
     options: &EstimatorOptions,
 ) -> Outcome<Identification> {
     let found = regression::identify(model, data, instruments, options)?;
+    // Parameters known from the file are inserted between the identified ones, in the order of the
+    // model.
     let solution = &found.solution;
     let infos = model.parameter_infos();
     let unknown: Vec<ParameterInfo> = found.unknown.iter().map(|k| infos[*k].clone()).collect();
+    // Values, standard deviations and status of the estimated parameters.
     let mut parameters = fit_parameters(&unknown, solution, &found.deviations);
     for one in found.refined.removed_parameters() {
         parameters[one].status = ParameterStatus::NotEssential;
@@ -140,11 +166,13 @@ pub fn identify(
             parameters.insert(k, known_parameter(info, model.nominal[k]));
         }
     }
+    // Notes need all parameters, in the order of the model.
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
-    // One band for fit and check, so that their figures can be compared.
+    // Fit and validation use one band, so that their figures can be compared.
     let band = compare::band(data);
+    // Error figures of identified and nominal values, on fit and validation runs.
     let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
@@ -159,6 +187,7 @@ pub fn identify(
     };
     let finite = |value: f64| value.is_finite().then_some(value);
     let of_recordings = recordings.flat_map(RecordingSegment::notes).cloned();
+    // The fit file contains all notes, also those of the recordings.
     let mut all_notes: Vec<RecordingNote> =
         model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
@@ -190,8 +219,9 @@ pub fn identify(
     })
 }
 
-/// The covariance of all base parameters, of which the known ones have none.
+/// The covariance of all base parameters, with zeros for known ones; `None` unless all values are finite.
 fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
+    // Known parameters have no uncertainty.
     let mut rows = vec![vec![0.0; n]; n];
     for (a, i) in found.unknown.iter().enumerate() {
         for (b, j) in found.unknown.iter().enumerate() {
@@ -203,7 +233,7 @@ fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
     is_known.then_some(rows)
 }
 
-/// A parameter that is a number of the model file.
+/// The entry of a parameter that is known from the model file.
 fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
     FitParameter {
         name: info.name.clone(),
@@ -218,7 +248,7 @@ fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
     }
 }
 
-/// What is not as one would wish: known parameters, undetermined ones, no deviations, impossible values.
+/// Notes on the result: known and undetermined parameters, weak instruments, few equations, impossible signs.
 fn remarks(
     model: &Model,
     found: &RegressionEstimate,
@@ -231,8 +261,8 @@ fn remarks(
         .filter(|p| p.status == ParameterStatus::Known)
     {
         notes.push(RecordingNote::info(format!(
-            "{} = {} holds numbers of the model file only: it is known, its force is taken off the measured one, and it is \
-             not identified.",
+            "{} = {} contains numbers of the model file only. It is known and not identified; its force is subtracted \
+             from the measured one.",
             p.name, p.expression
         )));
     }
@@ -242,24 +272,27 @@ fn remarks(
         && *strength < WEAK_INSTRUMENTS
     {
         notes.push(RecordingNote::warning(format!(
-            "The instruments say little: their smallest correlation with the regressor is {}. Are they of the same motion, \
-             and in step with the recording?",
+            "The instruments are weak: their smallest correlation with the regressor is {}. Check that they have the same \
+             motion as the recording and are synchronous with it.",
             number(*strength)
         )));
     }
+    // Reweighting may alternate between two solutions.
     if found
         .weighting
         .as_ref()
         .is_some_and(|weighting| !weighting.converged)
     {
         notes.push(RecordingNote::warning(message!(
-            "The weights have not settled: residuals depend on the weights from one solution to the next; leave out \
+            "The weights have not converged: residuals depend on the weights from one solution to the next; leave out \
              {} or {}.",
             Remedy::option(OptionName::Weights),
             Remedy::option(OptionName::Robust)
         )));
     }
+    // Each undetermined direction gets one note, with the values that were chosen in it.
     for direction in &solution.undetermined {
+        // The values along the direction are chosen nearest to the nominal ones.
         let kept: Vec<String> = direction
             .changes
             .iter()
@@ -268,7 +301,7 @@ fn remarks(
         let how = if kept.len() == 1 {
             "it stays at"
         } else {
-            "of all values that fit equally well those nearest to the nominal ones are taken:"
+            "of all values that fit equally well, those nearest to the nominal ones are used:"
         };
         notes.push(RecordingNote::warning(format!(
             "{}; {how} {}.",
@@ -276,10 +309,11 @@ fn remarks(
             kept.join(", ")
         )));
     }
+    // Without degrees of freedom the residual is zero; with few, its estimate is poor.
     if solution.rows <= solution.rank {
         notes.push(RecordingNote::warning(format!(
-            "There {} for as many unknown base parameters: no degree of freedom is left for the residuals, so neither \
-             standard deviations nor the error of the fit say anything; use a longer recording.",
+            "There {} for as many unknown base parameters: the residuals have no degree of freedom, so standard \
+             deviations and the error of the fit are meaningless; use a longer recording.",
             match solution.rows {
                 1 => "is 1 equation".to_owned(),
                 n => format!("are {n} equations"),
@@ -287,8 +321,8 @@ fn remarks(
         )));
     } else if found.deviations.few_samples {
         notes.push(RecordingNote::warning(format!(
-            "There are only {} equations for {}: standard deviations take the residuals for independent and are too small \
-             if they are not, and the error of the fit says little; use a longer recording (at least {FEWEST_ROWS} \
+            "There are only {} equations for {}: standard deviations assume independent residuals and are too small \
+             if they are not, and the error of the fit is not reliable; use a longer recording (at least {FEWEST_ROWS} \
              equations for each parameter).",
             solution.rows,
             count(
@@ -298,7 +332,9 @@ fn remarks(
             ),
         )));
     }
+    // A sign counts as wrong only if it is two standard deviations beyond zero.
     for (k, p) in parameters.iter().enumerate() {
+        // Undetermined parameters keep their nominal sign and are not tested.
         let slack = 2.0 * p.std.unwrap_or(0.0);
         let (wrong, expected) = match model.sign(k) {
             Sign::Positive => (p.value < -slack, "positive"),
@@ -307,7 +343,7 @@ fn remarks(
         };
         if wrong && p.status == ParameterStatus::Identified {
             notes.push(RecordingNote::warning(format!(
-                "{} = {} comes out as {} {}, but must be {expected} to make physical sense: the model lacks something, or \
+                "{} = {} is estimated as {} {}, but must be {expected} to be physically possible: the model lacks an effect, or \
                  the recording excites it too little.",
                 p.name,
                 p.expression,
@@ -319,7 +355,7 @@ fn remarks(
     notes
 }
 
-/// The value of an undetermined parameter beside its nominal one.
+/// The value of an undetermined parameter, compared with its nominal one.
 fn undetermined_text(p: &FitParameter) -> String {
     let value = number(p.value);
     match p.nominal {
@@ -333,13 +369,13 @@ fn undetermined_text(p: &FitParameter) -> String {
             number(nominal)
         ),
         None => format!(
-            "{} = {value} {} (the file gives no nominal value, 0 stands for it)",
+            "{} = {value} {} (the file gives no nominal value; 0 is used)",
             p.name, p.unit
         ),
     }
 }
 
-/// Figures with identified and with nominal values.
+/// Error figures with identified and with nominal values, over all samples and over the rows of the fit.
 fn both_figures(
     model: &Model,
     data: &[RecordingSegment],
@@ -359,7 +395,7 @@ fn both_figures(
 }
 
 impl Identification {
-    /// The identified values.
+    /// The values of all base parameters, in the order of the model and in their units.
     pub fn values(&self) -> Vec<f64> {
         self.fit.parameters.iter().map(|p| p.value).collect()
     }

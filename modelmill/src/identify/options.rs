@@ -1,39 +1,39 @@
-//! How parameters are estimated from the rows of a regressor.
+//! Options of the estimation of parameters.
 
 use crate::identify::refine::EstimateRefinement;
 
-/// How parameters are estimated; [`Estimation::default`] is least squares, where need be with each drive by
-/// its own residuals.
+/// Options of the estimation. [`EstimatorOptions::default`] is least squares, with weights by drive where these are
+/// needed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EstimatorOptions {
-    /// What each equation counts.
+    /// Weights of the equations.
     pub weights: EquationWeights,
-    /// Huber's robust estimate: residuals beyond this many standard deviations (taken from their median) count less; 1.345
-    /// is usual.
+    /// Bound of Huber's robust estimate: residuals beyond this many standard deviations (estimated by their median)
+    /// get less weight; 1.345 is usual.
     pub robust: Option<f64>,
-    /// What is made of the solution of least squares.
+    /// Refinement of the least-squares solution.
     pub refinement: EstimateRefinement,
-    /// Leave an equation out of the fit while its drive is slower than this part of its fastest, for at rest the friction
-    /// takes any value; 0.01 is usual.
+    /// Exclude an equation while its drive is slower than this fraction of its fastest rate, since friction at
+    /// standstill may have any value; 0.01 is usual.
     pub standstill: Option<f64>,
 }
 
-/// What each equation counts.
+/// Weights of the equations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EquationWeights {
-    /// `Channels` where drives have different units, and where cut-off and decimation are chosen; else `None`.
+    /// `Channels` if drives have different units, or if cut-off and decimation were chosen automatically; else `None`.
     #[default]
     Automatic,
-    /// All the same: ordinary least squares.
+    /// Equal weights: ordinary least squares.
     None,
-    /// Each drive's are divided by the standard deviation of its residuals (iterated).
+    /// Equations of each drive are divided by the standard deviation of its residuals (iterated).
     Channels,
-    /// Each sample's are divided by the standard deviation of the recording's columns `DRIVE_var`.
+    /// Equations of each sample are divided by its standard deviation, from the columns `DRIVE_var` of the recording.
     Variance,
 }
 
 impl EquationWeights {
-    /// What the JSON calls it.
+    /// Its name in the JSON and in options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Automatic => "automatic",

@@ -1,5 +1,5 @@
-//! Least squares over recordings: rows of the regressor are made block by block and kept only if
-//! they fit a modest memory; else they are made again for every pass.
+//! Least squares over recordings. Rows of the regressor are computed block by block and kept if they fit a moderate
+//! memory; otherwise they are computed again for every pass.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
@@ -21,39 +21,43 @@ use crate::stretch::RecordingSegment;
 use crate::stretch::variances;
 use crate::text::table::count;
 
-/// Numbers of the regressor that are kept between passes: 32 MB; beyond, making them again costs less than memory.
+/// Largest number of regressor entries that are kept between passes: 32 MB; above, computing again is faster than
+/// memory.
 const KEPT: usize = 1 << 22;
 
-/// Samples that are kept to either side beyond which the parallel filter reaches no more: its slowest pole falls by a factor of
-/// 1e9 there.
+/// Decimated samples to either side beyond which the filter of the decimation has no influence: its slowest pole has
+/// decayed by a factor of 1e9 there.
 const REACH: usize = 120;
 
-/// What least squares found.
+/// The estimate and its statistics.
 pub struct RegressionEstimate {
     /// The solution.
     pub solution: RegressionSolution,
-    /// What it is worth.
+    /// Standard deviations, covariance and effective numbers of samples.
     pub deviations: ParameterUncertainty,
-    /// The base parameters that solution and deviations are about, by position.
+    /// Indices of the base parameters that solution and deviations refer to.
     pub unknown: Vec<usize>,
-    /// What the rows were multiplied by.
+    /// Weights of the rows, if any were used.
     pub weighting: Option<RowWeighting>,
-    /// What came of refining them.
+    /// Result of the refinement.
     pub refined: RefinementResult,
-    /// Instruments, if any were used.
+    /// Statistics of the instruments, if any were used.
     pub instruments: Option<InstrumentStatistics>,
 }
 
-/// What instrumental variables say beside the solution.
+/// Statistics of instrumental variables in addition to the solution.
 pub struct InstrumentStatistics {
     /// The smallest canonical correlation between instruments and regressor, 0 to 1.
     pub strength: f64,
-    /// What least squares finds on the same rows.
+    /// The least-squares solution of the same rows, for comparison.
     pub least_squares: Vec<f64>,
 }
 
-/// Identifies the base parameters of a model from recordings, eq. (12). What is a number of the model file is no unknown:
-/// its force is taken off the measured one. `instruments` has one recording for each of `data`, or none.
+/// Identifies the base parameters of a model from recordings, eq. (12). Base parameters that are numbers of the model
+/// file are no unknowns: their force is subtracted from the measured one. `instruments` has one segment for each of
+/// `data`, or none.
+///
+/// Fails when nothing is unknown, and as [`Model::identify`] does.
 pub fn identify(
     model: &Model,
     data: &[RecordingSegment],
@@ -66,6 +70,7 @@ pub fn identify(
             model.path
         )));
     }
+    // Known parameters are subtracted, the others are estimated.
     let (known, unknown): (Vec<usize>, Vec<usize>) =
         (0..model.base.len()).partition(|k| model.is_known(*k));
     if unknown.is_empty() {
@@ -78,6 +83,7 @@ pub fn identify(
     let known: Vec<(usize, f64)> = known.into_iter().map(|k| (k, model.nominal[k])).collect();
     let nominal: Vec<f64> = unknown.iter().map(|k| model.nominal[*k]).collect();
     let samples: usize = data.iter().map(RecordingSegment::samples).sum();
+    // Each segment becomes a source of rows.
     let mut runs = data
         .iter()
         .enumerate()
@@ -94,21 +100,25 @@ pub fn identify(
         .collect::<Outcome<Vec<RegressionRows<'_>>>>()?;
     check_equation_count(data, &runs, unknown.len(), model)?;
     check_forces_nonzero(data, &runs)?;
-    // Plain least squares: one pass for the solution, two for the deviations. How often rows are reweighted nobody knows.
+    // Plain least squares: one pass for the solution, two for the deviations. The number of passes with reweighting
+    // is unknown.
     let by_channel = args.weights == EquationWeights::Channels;
     let reweighted = by_channel || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
     model
         .host()
         .run_job("identifying", passes * samples, |job| {
+            // Rows are kept in memory if they are few, so that later passes are fast.
             for run in &mut runs {
                 run.keep_if_small(job)?;
             }
             let channels = model.drives().len();
+            // The estimator requests the rows in several passes.
             let show = |visit: &mut RowVisitor<'_>| -> Outcome {
                 runs.iter()
                     .try_for_each(|run| run.visit_rows::<Error>(job, visit))
             };
+            // Instrumental variables have their own estimator and no refinement.
             if !instruments.is_empty() {
                 let found = estimate_with_instruments(unknown.len(), channels, show)?;
                 return Ok(RegressionEstimate {
@@ -123,11 +133,13 @@ pub fn identify(
                     }),
                 });
             }
+            // Weights by drive and robust weights are iterated by the estimator.
             let options = EstimateOptions {
                 by_channel,
                 huber: args.robust,
                 ..EstimateOptions::default()
             };
+            // Least squares, then the refinement of its reduced rows.
             let mut found = estimate(&nominal, channels, &options, show)?;
             let refined = refine(model, &mut found, &unknown, &nominal, args.refinement)?;
             let weighting = found.weighting;
@@ -171,7 +183,7 @@ fn check_equation_count(
     )))
 }
 
-/// Fails when all measured forces are zero: everything would fit them with zeros, without any doubt.
+/// Fails when all measured forces are zero: parameters of zero would fit them exactly.
 fn check_forces_nonzero(data: &[RecordingSegment], runs: &[RegressionRows<'_>]) -> Outcome {
     let is_idle = |run: &RegressionRows<'_>| run.measured.iter().all(|force| *force == 0.0);
     if !runs.iter().all(is_idle) {
@@ -181,7 +193,7 @@ fn check_forces_nonzero(data: &[RecordingSegment], runs: &[RegressionRows<'_>]) 
     Err(Error::input(zero_force_message(&files.join(", "))))
 }
 
-/// What is wrong with recordings whose forces are zero throughout.
+/// The error of recordings whose measured forces are all zero.
 pub fn zero_force_message(files: &str) -> Message {
     message!(
         "{files}: the measured forces are zero throughout, so that there is nothing to explain; record the forces of the \
@@ -190,23 +202,28 @@ pub fn zero_force_message(files: &str) -> Message {
     )
 }
 
-/// The rows of one recording: regressors of the instruments, if there are any, and of the recording itself.
+/// The rows of one segment: the regressor of the instruments, if there are any, and of the recording itself.
 struct RegressionRows<'a> {
+    /// The model whose regressor is evaluated.
     model: &'a Model,
+    /// The states and forces.
     data: &'a RecordingSegment,
+    /// The segment of instruments with the same times.
     instruments: Option<&'a RecordingSegment>,
-    /// Columns that are known, with their parameters' values.
+    /// Known columns with the values of their parameters.
     known: &'a [(usize, f64)],
-    /// The other columns.
+    /// Unknown columns.
     unknown: &'a [usize],
-    /// Interleaved per sample, decimated.
+    /// Measured forces, interleaved per sample, decimated.
     measured: Vec<f64>,
-    /// What rows are multiplied by, if not by 1.
+    /// Weights of the rows, if they are not 1.
     factors: Option<Vec<f64>>,
+    /// All rows in memory, if they are few enough or decimated.
     kept: Option<Vec<f64>>,
 }
 
 impl<'a> RegressionRows<'a> {
+    /// Prepares the forces and weights of a segment; fails if variances are requested and missing.
     fn new(
         model: &'a Model,
         data: &'a RecordingSegment,
@@ -216,6 +233,7 @@ impl<'a> RegressionRows<'a> {
         weights: EquationWeights,
     ) -> Outcome<Self> {
         let drives = model.drives();
+        // Weights from variances need a variance for every drive.
         let spread = if weights == EquationWeights::Variance {
             let Some(variance) = &data.variance else {
                 let columns: Vec<String> = drives
@@ -255,13 +273,14 @@ impl<'a> RegressionRows<'a> {
         })
     }
 
-    /// Numbers of a row before the known columns leave.
+    /// Number of entries of a row, including known columns.
     fn width(&self) -> usize {
         self.model.base.len() * (1 + usize::from(self.instruments.is_some()))
     }
 
-    /// Decimation needs neighbours of all rows at hand; else they are kept if they are not too many.
+    /// Computes all rows once and keeps them, if they are few enough or decimated: decimation needs neighbouring rows.
     fn keep_if_small(&mut self, job: &JobHandle) -> Outcome {
+        // Without decimation, rows that are too many are computed again in each pass.
         let width = self.width() * self.model.drives().len();
         let decimation = self.data.decimation();
         let samples = self.data.samples();
@@ -283,6 +302,7 @@ impl<'a> RegressionRows<'a> {
                 kept.extend_from_slice(w);
                 return Ok(());
             }
+            // Rows are decimated in windows, so that only a part of them is in memory at a time.
             window.table.extend_from_slice(w);
             let have = window.table.len() / width;
             if have > longest {
@@ -293,6 +313,7 @@ impl<'a> RegressionRows<'a> {
             }
             Ok(())
         })?;
+        // The last window ends with the segment.
         if decimation > 1 {
             let have = window.table.len() / width;
             window
@@ -303,7 +324,7 @@ impl<'a> RegressionRows<'a> {
         Ok(())
     }
 
-    /// Shows all rows with the measured values.
+    /// Passes all rows with the measured values to `visit`.
     fn visit_rows<E: From<Error> + From<LeastSquaresError>>(
         &self,
         job: &JobHandle,
@@ -314,6 +335,7 @@ impl<'a> RegressionRows<'a> {
             job.add(self.data.samples());
             return Ok(());
         }
+        // Blocks are weighted and split as the kept table would be.
         let mut row = 0;
         self.blocks::<E>(&mut |w| {
             let rows = w.len() / self.width();
@@ -324,24 +346,28 @@ impl<'a> RegressionRows<'a> {
         })
     }
 
-    /// Shows rows of the unknown columns, with what the known ones make taken off the measured values, and weighed;
-    /// `first` is the first of the rows.
+    /// Passes weighted rows of the unknown columns to `visit`, with the force of known columns subtracted from the
+    /// measured values; `first` is the index of the first row.
     fn visit_unknown(
         &self,
         w: &[f64],
         first: usize,
         visit: &mut RowVisitor<'_>,
     ) -> Result<(), LeastSquaresError> {
+        // The measured forces and weights of these rows.
         let at = first..first + w.len() / self.width();
         let measured = &self.measured[at.clone()];
         let factors = self.factors.as_ref().map(|factors| &factors[at]);
         if self.known.is_empty() && factors.is_none() {
             return visit(w, measured);
         }
+        // Rows of the instruments and of the recording are joined; each part has all columns of the
+        // model.
         let n = self.model.base.len();
         let mut rows = Vec::with_capacity(w.len());
         let mut rest = Vec::with_capacity(measured.len());
         for (i, (row, y)) in w.chunks_exact(self.width()).zip(measured).enumerate() {
+            // Known columns are dropped from the row, and their force from the measured value.
             let factor = factors.map_or(1.0, |factors| factors[i]);
             for part in row.chunks_exact(n) {
                 rows.extend(self.unknown.iter().map(|k| factor * part[*k]));
@@ -353,7 +379,8 @@ impl<'a> RegressionRows<'a> {
         visit(&rows, &rest)
     }
 
-    /// Blocks of the regressor, row by row; behind each row of the instruments the one of the recording.
+    /// Passes blocks of the regressor to `visit`, row by row; each row of the instruments is followed by that of the
+    /// recording.
     fn blocks<E: From<Error>>(
         &self,
         visit: &mut dyn FnMut(&[f64]) -> Result<(), E>,
@@ -365,6 +392,7 @@ impl<'a> RegressionRows<'a> {
         self.data.for_each_block(self.model, |states| {
             rows.clear();
             rows.resize(states.len() * drives * width, 0.0);
+            // The states of the instruments have the same indices as those of the recording.
             if let Some(instruments) = self.instruments {
                 let theirs = instruments.states(start, start + states.len());
                 fill(&evaluator, &theirs, drives, width, 0, &mut rows)
@@ -375,6 +403,7 @@ impl<'a> RegressionRows<'a> {
             if let Err(fault) = fill(&evaluator, states, drives, width, place, &mut rows) {
                 return Ok(Err(fault));
             }
+            // Rows of excluded forces are zero, as the forces are.
             let first = start - states.len();
             for (d, out) in self.data.run.left_out.iter().enumerate() {
                 for (i, _) in (out[first..start].iter().enumerate()).filter(|(_, out)| **out) {
@@ -387,17 +416,18 @@ impl<'a> RegressionRows<'a> {
     }
 }
 
-/// Some rows in a row while they are decimated: all of them, unless they are too many to be held at once.
+/// Consecutive rows during their decimation: all of them, unless they are too many for memory.
 struct DecimationWindow {
     /// The first sample of the table, one of those that are kept.
     first: usize,
     /// The first sample that is not yet decimated.
     next: usize,
+    /// Rows from `first` on.
     table: Vec<f64>,
 }
 
 impl DecimationWindow {
-    /// Decimates what stands before `end`, counted from the first sample of the table.
+    /// Decimates the rows before `end`, counted from the first sample of the table, and appends them to `kept`.
     fn decimate(
         &mut self,
         width: usize,
@@ -405,6 +435,7 @@ impl DecimationWindow {
         end: usize,
         kept: &mut Vec<f64>,
     ) -> Result<(), FilterError> {
+        // The complete table is decimated, and the part that is final is appended.
         let short = decimate_table(&self.table, width, decimation)?;
         while self.next < self.first + end {
             let at = (self.next - self.first) / decimation * width;
@@ -414,7 +445,7 @@ impl DecimationWindow {
         Ok(())
     }
 
-    /// Lets rows go that the filter does not reach from those that are to come.
+    /// Drops rows that the filter no longer needs for later samples.
     fn drop_passed_rows(&mut self, width: usize, decimation: usize, reach: usize) {
         let from = self.next.saturating_sub(reach).max(self.first) / decimation * decimation;
         self.table.drain(..(from - self.first) * width);
@@ -422,7 +453,7 @@ impl DecimationWindow {
     }
 }
 
-/// What rows are multiplied by when both the variances and the equations left out have their say.
+/// Weights of the rows from both variances and excluded equations.
 fn combined_factors(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
     match (spread, weights) {
         (Some(spread), Some(weights)) => {
@@ -432,7 +463,7 @@ fn combined_factors(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option
     }
 }
 
-/// Writes the regressor of some states into rows of `width` numbers, from `place` on.
+/// Writes the regressor of some states into rows of `width` entries, starting at entry `place` of each.
 fn fill(
     evaluator: &ModelEvaluator<'_>,
     states: &MotionStates<'_>,
@@ -443,6 +474,7 @@ fn fill(
 ) -> Result<(), PoseFault> {
     let mut first = 0;
     evaluator.regressor_blocks(states, |len, columns| {
+        // Columns are ordered by drive; rows are ordered by sample and drive.
         let n = columns.len() / drives.max(1);
         for (k, column) in columns.iter().enumerate() {
             let at = first * width + (k / n) * width + place + k % n;

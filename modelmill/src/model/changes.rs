@@ -1,4 +1,4 @@
-//! `diff`: what a variant changes, for people who review it.
+//! `diff`: the differences of two models, for reviewers.
 
 use modelmill_codegen::review::ReducedEquations;
 use modelmill_codegen::{OperationCount, ProgramStage};
@@ -6,14 +6,14 @@ use modelmill_codegen::{OperationCount, ProgramStage};
 use crate::model::Model;
 use crate::model::entries::entries;
 
-/// A named entry before and after; equal ones are left out.
+/// A named entry before and after a change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EntryChange {
-    /// What it is called: its table and its own name, or a product of parameters.
+    /// Its name: its table and its own name, or a product of parameters.
     pub name: String,
-    /// What it was; `None` if it is new.
+    /// Its text before; `None` if it is new.
     pub before: Option<String>,
-    /// What it is now; `None` if it is gone.
+    /// Its text after; `None` if it was removed.
     pub after: Option<String>,
 }
 
@@ -35,6 +35,7 @@ fn changed_entries(before: &[(String, String)], after: &[(String, String)]) -> V
             before: find(before, name),
             after: find(after, name),
         })
+        // Constants in numeric form may differ by rounding, which is no change.
         .filter(|change| match (&change.before, &change.after) {
             (Some(before), Some(after)) => !is_equal_but_for_rounding(before, after),
             (before, after) => before != after,
@@ -42,9 +43,9 @@ fn changed_entries(before: &[(String, String)], after: &[(String, String)]) -> V
         .collect()
 }
 
-/// Whether two texts are the same but for rounding in the last places of their numbers.
+/// Whether two texts are equal apart from rounding in the last digits of their numbers.
 fn is_equal_but_for_rounding(a: &str, b: &str) -> bool {
-    /// A few roundings of a number of the machine.
+    /// Relative tolerance: a few roundings of double precision.
     const ROUNDING: f64 = 2e-15;
     let (mut a, mut b) = (pieces(a), pieces(b));
     loop {
@@ -60,7 +61,7 @@ fn is_equal_but_for_rounding(a: &str, b: &str) -> bool {
     }
 }
 
-/// Numbers of a text, and what stands between them.
+/// The text split into numbers and the pieces between them.
 fn pieces(text: &str) -> impl Iterator<Item = &str> {
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
     let mut rest = text;
@@ -74,24 +75,35 @@ fn pieces(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Everything that differs between two models.
+/// The differences of two models.
 #[derive(Clone, Debug)]
 pub struct ModelChanges {
     /// Entries of the model files.
     pub entries: Vec<EntryChange>,
-    /// p_g, eq. (5): which products are in it, or without effect.
+    /// p_g, eq. (5): products that enter it, or lose their effect.
     pub products: Vec<EntryChange>,
-    /// Dependences of columns, eq. (6).
+    /// Dependencies of columns, eq. (6).
     pub dependencies: Vec<EntryChange>,
-    /// p_min, eq. (16), by retained products.
+    /// p_min, eq. (16), named by retained products.
     pub base: Vec<EntryChange>,
-    /// Operations of a call by the name of the function, before and after.
+    /// Numbers of operations of a call, by the name of the function, before and after.
     pub operations: Vec<(&'static str, OperationCount, OperationCount)>,
 }
 
 impl ModelChanges {
-    /// What changes from one model to another.
+    /// The differences of `after` relative to `before`.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::ModelChanges;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let same = ModelChanges::from_models(&arm, &arm);
+    /// assert!(same.entries.is_empty() && same.base.is_empty());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn from_models(before: &Model, after: &Model) -> Self {
+        // Each list becomes pairs of a name and a text, which are compared by name.
         let products = |model: &Model| -> Vec<(String, String)> {
             let reduction = &model.derivation.reduction;
             let mechanism = &model.derivation.mechanism;
@@ -138,7 +150,7 @@ impl ModelChanges {
     }
 }
 
-/// The dependencies by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
+/// The dependencies, eq. (6), named by product: `d1*h[m1*dc1] + d1^2*h[m1*dc1^2]`.
 fn dependencies(model: &Model) -> Vec<(String, String)> {
     let equations = ReducedEquations::new(&model.derivation, None);
     equations
@@ -149,6 +161,7 @@ fn dependencies(model: &Model) -> Vec<(String, String)> {
             let terms: Vec<String> = line
                 .equals
                 .iter()
+                // Factors of one are omitted, sums are put in brackets.
                 .map(|(retained, factor)| match factor.as_str() {
                     "1" => format!("h[{retained}]"),
                     "-1" => format!("-h[{retained}]"),

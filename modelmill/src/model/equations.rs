@@ -1,4 +1,4 @@
-//! `equations`: the reduced model for people and programs.
+//! `equations`: the reduced model as a page or as JSON.
 
 use modelmill_codegen::review::{PageFormat, ReducedEquations, page};
 use modelmill_identify::RecordingNote;
@@ -7,20 +7,29 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::model::sampled_rank::{SampledRank, judge_rank};
 
-/// The equations of a model, written out.
+/// The equations of a model as text.
 #[derive(Clone, Debug)]
 pub struct EquationsText {
-    /// The text, in the form that was asked for.
+    /// The text, in the requested format.
     pub text: String,
-    /// What there is to know about the numeric rank, eq. (9), beside the exact one.
+    /// Notes on the numeric rank, eq. (9), compared with the exact one.
     pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// The equations as a page for people: p_g, dependences, p_min, intermediate variables, counts of operations. Those of a
-    /// long chain take seconds to write.
+    /// The equations as a page: p_g, dependencies, p_min, intermediate variables, numbers of operations. The page of
+    /// a long chain takes seconds.
     ///
-    /// Fails only when whoever watches stops it.
+    /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::model::PageFormat;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert!(arm.equations(PageFormat::Markdown)?.text.contains("p1_min"));
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn equations(&self, format: PageFormat) -> Outcome<EquationsText> {
         let (rank, notes) = self.numeric_rank()?;
         let what = format!("writing the equations of {}", self.name);
@@ -36,11 +45,12 @@ impl Model {
 
     /// The equations as one JSON object.
     ///
-    /// Fails only when whoever watches stops it.
+    /// Fails only when the listener stops the job.
     pub fn equations_json(&self) -> Outcome<EquationsText> {
         let (rank, notes) = self.numeric_rank()?;
         let rank = rank.as_ref().map(|rank| &rank.numeric_rank);
         let mut equations = ReducedEquations::new(&self.derivation, rank);
+        // The JSON names the model by its file, not by the mechanism.
         equations.model.clone_from(&self.name);
         Ok(EquationsText {
             text: equations.json(),
@@ -48,7 +58,8 @@ impl Model {
         })
     }
 
-    /// Eq. (9) on the file's values, with a warning where it says something else than exact reduction.
+    /// The numeric rank, eq. (9), at the file's values, with a warning if it contradicts the exact reduction. `None`
+    /// if it was not found. The notes are also passed to the listener.
     fn numeric_rank(&self) -> Outcome<(Option<SampledRank>, Vec<RecordingNote>)> {
         let judged = judge_rank(self)?;
         let warnings = judged.warnings.iter();

@@ -1,4 +1,4 @@
-//! A model file that was read and derived, with names for people.
+//! A model file that was read and derived, with the names and units that users see.
 
 mod changes;
 mod entries;
@@ -33,44 +33,60 @@ pub use sampled_rank::SampledRank;
 pub use summary::{ModelCheck, ModelSummary};
 pub use values::BaseParameterValues;
 
-/// A model file that was read and derived. A clone shares what was derived.
+/// A model file that was read and derived. A clone shares the derivation.
 #[derive(Clone)]
 pub struct Model {
-    /// The file's name without folder and extension; what the JSON calls the model.
+    /// The file's name without folder and extension; also the name of the model in the JSON.
     pub name: String,
-    /// What messages call the file.
+    /// Name of the file in messages.
     pub path: String,
-    /// What the file says.
+    /// The contents of the file.
     pub loaded: Arc<LoadedModel>,
-    /// Everything the mill knows about it.
+    /// The derivation: reduced equations and programs.
     pub derivation: Arc<Derivation>,
-    /// The base parameters.
+    /// The base parameters, eq. (16), with names, expressions and units.
     pub base: Vec<BaseParameterEntry>,
-    /// Their values from the file's nominal values.
+    /// Their values, from the file's nominal values or from a fit, in their units.
     pub nominal: Vec<f64>,
-    /// What was found on the way that may not be intended, beside the warnings of `loaded`.
+    /// Notes on the file in addition to the warnings of `loaded`, such as entries without effect.
     pub notes: Vec<RecordingNote>,
-    /// Covariance of the values in `nominal`, where they are those of a fit that tells it.
+    /// Covariance of the values in `nominal`, if they come from a fit that has one.
     covariance: Option<Arc<DMatrix<f64>>>,
-    /// Whether the value in `nominal` was identified, in the file or in a fit that was given.
+    /// Whether each value in `nominal` was identified, in the file or in a fit.
     identified: Vec<bool>,
-    /// The sign that each dynamic parameter must have.
+    /// The sign that each dynamic parameter must have, in the order of the mechanism.
     signs: Vec<Sign>,
-    /// Where the file came from.
+    /// The source of the file and of later reads.
     host: Host,
 }
 
 impl Model {
     /// Reads a model file from disk and derives it.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    /// Fails with every finding about the file, each with its place, or with the reason why the mechanism cannot be
+    /// derived.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// assert_eq!(arm.drives(), ["joint1", "joint2"]);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn open(path: impl AsRef<Path>) -> Outcome<Self> {
         Host::new().model(path)
     }
 
-    /// Derives a model from the text of its file, which extends nothing.
+    /// Derives a model from the text of its file, which must not extend another file. `name` is its name in messages.
     ///
     /// Fails as [`Model::open`] does.
+    ///
+    /// ```
+    /// let text = std::fs::read_to_string("../model-spec/models/two_link.toml").unwrap();
+    /// let arm = modelmill::Model::from_text("arm.toml", &text)?;
+    /// assert_eq!(arm.name, "arm");
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn from_text(name: &str, text: &str) -> Outcome<Self> {
         let host = Host::new();
         let loaded = host.load_text(Path::new(name), text)?;
@@ -81,7 +97,8 @@ impl Model {
 impl Host {
     /// Reads a model file and derives it.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why it cannot be derived.
+    /// Fails with every finding about the file, each with its place, or with the reason why the mechanism cannot be
+    /// derived.
     pub fn model(&self, path: impl AsRef<Path>) -> Outcome<Model> {
         let path = path.as_ref();
         let loaded = self.load(path)?;
@@ -90,7 +107,7 @@ impl Host {
 
     /// Derives a model that was read from `path`.
     ///
-    /// Fails with the reason why it cannot be derived.
+    /// Fails with the reason why the mechanism cannot be derived.
     pub fn derive(&self, path: &str, mut loaded: LoadedModel) -> Outcome<Model> {
         if self.is_at_values() {
             loaded.mechanism = loaded.mechanism.with_numeric_constants();
@@ -101,6 +118,7 @@ impl Host {
                 modelmill_codegen::derive(mechanism)
             })?
             .map_err(|error| Error::derivation(path, error))?;
+        // Findings about the derived model become notes with their place in the file.
         let mut notes = Vec::new();
         notes.extend(caution(&derivation, path));
         for (k, says) in ineffective_retained(&derivation) {
@@ -115,10 +133,12 @@ impl Host {
         }
         let found = derivation.identified_base();
         let said = derivation.mechanism.identified_base.len();
+        // Identified values are matched by expression: those of another geometry have no base
+        // parameter here.
         if found.len() < said {
             notes.push(RecordingNote::warning(message!(
-                "{path}: {} of the {said} values of `identified.base` are of no base parameter of this model and left aside; \
-                 identify it again and let {} write the values",
+                "{path}: {} of the {said} values of `identified.base` belong to no base parameter of this model and are ignored; \
+                 identify the model again and write the values with {}",
                 said - found.len(),
                 Remedy::command(CommandName::Adopt)
             )));
@@ -156,13 +176,13 @@ fn base(derivation: &Derivation) -> Vec<BaseParameterEntry> {
     base
 }
 
-/// What must be known of a base that holds for one geometry only.
+/// The warning of a base that is valid for one geometry only; `None` for general constants.
 fn caution(derivation: &Derivation, path: &str) -> Option<RecordingNote> {
     let says = derivation.reduction.method.caution()?;
     Some(RecordingNote::warning(format!("{path}: {says}")))
 }
 
-/// What `retain` asks for that cannot be, in words, by its place in the list.
+/// Entries of `retain` without effect, each with its index in the list and the reason.
 pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     let reduction = &derivation.reduction;
     let mechanism = &derivation.mechanism;
@@ -170,6 +190,7 @@ pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     for (k, powers) in mechanism.retain.iter().enumerate() {
         let wanted = ParameterMonomial(powers.iter().map(|(p, n)| (p.0, *n)).collect());
         let name = wanted.text(mechanism);
+        // A product is retained, dependent, without effect, or unknown.
         let why = match reduction.products.iter().position(|p| *p == wanted) {
             Some(at) if reduction.retained.contains(&at) => continue,
             Some(_) => "its column depends on those of products that are retained before it",
@@ -183,8 +204,9 @@ pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     says
 }
 
-/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects say.
+/// The sign that each dynamic parameter must have: masses, moments of inertia, and what kinds of effects prescribe.
 fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
+    // Masses and diagonal entries of the inertia must be positive.
     let mut signs = vec![Sign::Any; mechanism.parameters.len()];
     let mut positive = |exact: &ExactExpression| {
         if let Some(p) = multiple_of(exact) {
@@ -202,6 +224,7 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
     for lumped in &mechanism.lumped_masses {
         positive(&lumped.mass);
     }
+    // Signs of effect parameters come from the kind; a kind that is unknown here prescribes none.
     for effect in &mechanism.effects {
         let Some(kind) = kinds.iter().find(|kind| kind.name == effect.kind) else {
             continue;
@@ -216,7 +239,7 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
     signs
 }
 
-/// The parameter of which an expression is a positive rational multiple.
+/// The parameter of which an expression is a positive rational multiple; `None` for other expressions.
 fn multiple_of(exact: &ExactExpression) -> Option<ParameterIdx> {
     let is_positive = |exact: &ExactExpression| {
         let mut free = true;
@@ -236,12 +259,12 @@ fn multiple_of(exact: &ExactExpression) -> Option<ParameterIdx> {
 }
 
 impl Model {
-    /// Where the model came from.
+    /// The host that read the model.
     pub fn host(&self) -> &Host {
         &self.host
     }
 
-    /// The text of its file.
+    /// Text of the model file.
     pub fn text(&self) -> &str {
         self.loaded
             .sources
@@ -250,17 +273,18 @@ impl Model {
             .map_or("", |file| &file.text)
     }
 
-    /// The files that it was read from.
+    /// Paths of all files that were read for it.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.loaded.sources.paths()
     }
 
-    /// What must be known of base parameters that were found numerically, for this geometry only.
+    /// The warning of base parameters that were found numerically and are valid for this geometry only; `None` for
+    /// others.
     pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
 
-    /// Gravity in the frame of the base with the constants of the file, m/s^2.
+    /// Gravity in the base frame for the constants of the file, m/s^2.
     pub fn gravity(&self) -> [f64; 3] {
         let mechanism = &self.derivation.mechanism;
         let value = |symbol| match symbol {
@@ -270,7 +294,7 @@ impl Model {
         mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
     }
 
-    /// Active coordinates with whether they are angles.
+    /// Names of the active coordinates, each with whether it is an angle (rad) or a length (m).
     pub fn motions(&self) -> Vec<(String, bool)> {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
@@ -279,11 +303,13 @@ impl Model {
             .collect()
     }
 
-    /// Products that a base parameter consists of, with what they are multiplied by for the file's constants.
+    /// The products of parameters in a base parameter, each with its factor for the file's constants.
     pub fn products_of(&self, k: usize) -> Vec<(&ParameterMonomial, f64)> {
         let reduction = &self.derivation.reduction;
         let constants = &self.derivation.mechanism.constants;
         let constants: Vec<f64> = constants.iter().map(|c| c.value).collect();
+        // The retained product has the factor 1; the others come from the dependencies of columns, eq.
+        // (6).
         let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
         for (line, factors) in reduction
             .dependencies
@@ -297,13 +323,13 @@ impl Model {
         products
     }
 
-    /// The sign that a dynamic parameter must have.
+    /// The sign that a dynamic parameter must have, by its index in the mechanism.
     pub fn sign_of(&self, parameter: usize) -> Sign {
         self.signs[parameter]
     }
 
-    /// What the nominal values say beforehand of some base parameters, each product of parameters with the relative standard
-    /// deviation `sigma`; nothing of those that the file gives no value for.
+    /// Nominal values as priors of some base parameters, each product of parameters with the relative standard
+    /// deviation `sigma`. Base parameters without a nominal value get no prior.
     pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
         let parameters = &self.derivation.mechanism.parameters;
         let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
@@ -323,12 +349,12 @@ impl Model {
         believed.collect()
     }
 
-    /// Whether a base parameter consists of numbers of the model file only, so that there is nothing to identify.
+    /// Whether a base parameter consists of numbers of the model file only, so that it is not identified.
     pub fn is_known(&self, k: usize) -> bool {
         self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
     }
 
-    /// Whether a base parameter belongs to an effect rather than to the bodies.
+    /// Whether the retained product of a base parameter belongs to an effect, not to the bodies.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;
@@ -337,8 +363,9 @@ impl Model {
         terms.any(|term| powers.iter().any(|(p, _)| *p == term.parameter.0))
     }
 
-    /// The sign that a base parameter must have, where all of its summands must have the same.
+    /// The sign that a base parameter must have, if all of its summands have the same sign; else `Any`.
     pub fn sign(&self, k: usize) -> Sign {
+        // Even powers keep the sign; a factor of unknown sign leaves the product open.
         let sign_of = |(product, factor): &(&ParameterMonomial, f64)| {
             let mut is_positive = *factor > 0.0;
             for (p, power) in &product.0 {
@@ -378,6 +405,7 @@ impl Model {
         self.coordinates(true)
     }
 
+    /// Names of the passive or of the active coordinates.
     fn coordinates(&self, passive: bool) -> Vec<String> {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
@@ -386,7 +414,7 @@ impl Model {
             .collect()
     }
 
-    /// Names of the drives.
+    /// Names of the drives, in the order of the rows of the regressor.
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()
@@ -399,7 +427,7 @@ impl Model {
         undriven.map(|drive| drive.name.clone()).collect()
     }
 
-    /// Unit of a drive's force: N or N m.
+    /// Unit of a drive's force: `N` or `N m`.
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
         mechanism.drives[drive]
@@ -407,7 +435,7 @@ impl Model {
             .force_unit(&mechanism.coordinates)
     }
 
-    /// The base parameters as a fit describes them.
+    /// The base parameters as a fit file lists them.
     pub fn parameter_infos(&self) -> Vec<ParameterInfo> {
         self.base
             .iter()
@@ -421,7 +449,19 @@ impl Model {
             .collect()
     }
 
-    /// The model with other values of its base parameters in the place of the file's, such as those of a fit; in its order.
+    /// The model with other values of its base parameters, such as those of a fit, in its order.
+    ///
+    /// # Panics
+    /// If the number of values is not that of the base parameters.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// let values: Vec<f64> = arm.nominal.iter().map(|value| 1.1 * value).collect();
+    /// assert_eq!(arm.with_values(&values).nominal, values);
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
         assert_eq!(
@@ -437,8 +477,8 @@ impl Model {
         }
     }
 
-    /// The model with the values of a fit, see [`Model::values_of`]. Where the fit tells how well it knows them, what
-    /// [`Model::diagnose`] holds may be off by as much.
+    /// The model with the values of a fit, see [`Model::values_of`]. If the fit has a covariance, [`Model::diagnose`]
+    /// allows fixed values to differ by that uncertainty.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
@@ -447,12 +487,12 @@ impl Model {
         }
     }
 
-    /// How well the values of some base parameters are known: the inverse of their covariance, if it has one.
+    /// The information matrix of some base parameters, the inverse of their covariance; `None` without one.
     pub(crate) fn information(&self, parameters: &[usize]) -> Option<DMatrix<f64>> {
         let covariance = self.covariance.as_ref()?;
         let n = parameters.len();
         let part = DMatrix::from_fn(n, n, |i, j| covariance[(parameters[i], parameters[j])]);
-        // Parameters differ by orders of magnitude.
+        // Scaling to equal variances keeps the inverse accurate, since parameters differ by orders of magnitude.
         let scale = part.diagonal().map(|variance| variance.sqrt().recip());
         let scaled = DMatrix::from_fn(n, n, |i, j| part[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
@@ -463,7 +503,7 @@ impl Model {
             .then_some(information)
     }
 
-    /// The model with the values of another one for all base parameters that both have.
+    /// The model with the identified values of another model for all base parameters with the same expression.
     pub(crate) fn with_values_of(mut self, other: &Self) -> Self {
         for (k, base) in self.base.iter().enumerate() {
             let same = other
@@ -478,23 +518,24 @@ impl Model {
         self
     }
 
-    /// Whether the value of a base parameter was identified as a whole, in the file or in a fit, rather than made of parameters.
+    /// Whether the value of a base parameter was identified, in the file or in a fit, and not computed from parameters.
     pub fn is_identified(&self, k: usize) -> bool {
         self.identified[k]
     }
 
-    /// Whether the file gives a nominal value for anything that a base parameter consists of, or its value was identified.
+    /// Whether the value of a base parameter was identified, or the file gives nominal values for one of its products.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;
         }
+        // All products that are merged into this base parameter, also indirectly.
         let reduction = &self.derivation.reduction;
         let parameters = &self.derivation.mechanism.parameters;
         let is_in = |line: &&ColumnDependency| line.equals.iter().any(|(at, _)| *at == k);
         let mut lumped: Vec<usize> = (reduction.dependencies.iter().filter(is_in))
             .map(|line| line.product)
             .collect();
-        // What others bring into these is in it as well.
+        // Products that depend via these are part of it as well.
         while let Some(more) = (reduction.dependencies.iter())
             .filter(|line| line.via.iter().any(|(product, _)| lumped.contains(product)))
             .map(|line| line.product)
@@ -502,6 +543,7 @@ impl Model {
         {
             lumped.push(more);
         }
+        // A product has a nominal value if all its factors have one that is not zero.
         std::iter::once(reduction.retained[k])
             .chain(lumped)
             .any(|product| {
@@ -510,7 +552,8 @@ impl Model {
             })
     }
 
-    /// Whether passive coordinates are followed from state to state by Newton's method, for want of a closed form.
+    /// Whether passive coordinates are solved for by Newton's method from state to state, because a closed form is
+    /// missing.
     pub fn has_iterative_loops(&self) -> bool {
         matches!(
             self.derivation.programs.passive_position,
@@ -518,7 +561,7 @@ impl Model {
         )
     }
 
-    /// Effects whose force depends on the load of the drive.
+    /// Kinds of the effects whose force depends on the load of the drive.
     pub fn load_dependent_effects(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();
         effects

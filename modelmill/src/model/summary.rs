@@ -1,4 +1,4 @@
-//! `check`: what a model file holds, and how sound its base is.
+//! `check`: contents of a model file, and the consistency of its base parameters.
 
 use modelmill_codegen::Derivation;
 use modelmill_identify::RecordingNote;
@@ -7,29 +7,36 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::model::sampled_rank::{SampledRank, judge_rank};
 
-/// A model that was looked over.
+/// The result of a check.
 pub struct ModelCheck {
     /// The model.
     pub model: Model,
-    /// What it consists of.
+    /// Its contents.
     pub summary: ModelSummary,
-    /// Eq. (9) on the file's values, where it has an answer.
+    /// Eq. (9) on the file's values, if it was found.
     pub rank: Option<SampledRank>,
-    /// Where the numeric rank says something else than exact reduction.
+    /// Contradictions between the numeric rank and the exact reduction.
     pub warnings: Vec<String>,
 }
 
 impl Model {
-    /// What the model consists of.
+    /// Contents of the model, by names.
     pub fn summary(&self) -> ModelSummary {
         ModelSummary::new(&self.derivation)
     }
 
-    /// Looks the model over: what it consists of, and its rank in numbers beside the exact one.
+    /// Checks the model: its contents, and its numeric rank compared with the exact one.
     ///
-    /// Fails only when whoever watches stops it.
+    /// Fails only when the listener stops the job.
+    ///
+    /// ```
+    /// let checked = modelmill::Model::open("../model-spec/models/two_link.toml")?.check()?;
+    /// assert_eq!(checked.summary.bodies, 2);
+    /// assert!(checked.rank.is_some());
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn check(&self) -> Outcome<ModelCheck> {
-        // Without any product there is nothing whose rank could be looked at.
+        // Without products of parameters there is no regressor and no rank.
         let (rank, warnings) = if self.derivation.reduction.products.is_empty() {
             (None, Vec::new())
         } else {
@@ -49,26 +56,26 @@ impl Model {
     }
 }
 
-/// What a model consists of.
+/// Contents of a model.
 #[derive(Clone, Debug)]
 pub struct ModelSummary {
-    /// Parts.
+    /// Number of parts.
     pub bodies: usize,
-    /// Lumped masses.
+    /// Number of lumped masses.
     pub lumped_masses: usize,
-    /// Active coordinates.
+    /// Names of the active coordinates.
     pub active: Vec<String>,
-    /// Passive coordinates.
+    /// Names of the passive coordinates (determined by loop closure).
     pub passive: Vec<String>,
-    /// Loops.
+    /// Names of the loops.
     pub loops: Vec<String>,
-    /// Drives.
+    /// Names of the drives, including those that share rows.
     pub drives: Vec<String>,
-    /// Rows on which no drive acts.
+    /// Names of the rows on which no drive acts.
     pub undriven: Vec<String>,
-    /// Kinds of the effects.
+    /// Kinds of the effects, one for each effect.
     pub effects: Vec<String>,
-    /// Dynamic parameters.
+    /// Names of the dynamic parameters.
     pub parameters: Vec<String>,
 }
 

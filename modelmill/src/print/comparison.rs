@@ -14,6 +14,7 @@ impl ModelComparison {
         let mut object = json!({ "model": self.model, "parameters": parameters });
         let figures = serde_json::to_value(&self.figures);
         let figures = figures.map_err(|error| Error::input(error.to_string()))?;
+        // The figures are part of the object itself, not a member of it.
         if let (Some(object), Some(figures)) = (object.as_object_mut(), figures.as_object()) {
             object.extend(figures.clone());
             object.insert("where".to_owned(), json!(self.places.regions));
@@ -22,7 +23,7 @@ impl ModelComparison {
         Ok(object)
     }
 
-    /// The same for people.
+    /// The comparison as text: figures of each drive, and the regions of the error.
     pub fn text(&self, parameters: &str, style: TerminalStyle) -> String {
         let mut lines = vec![style.bold(&format!(
             "{} with {parameters} parameters on {}",

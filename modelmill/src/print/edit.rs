@@ -9,7 +9,7 @@ use crate::text::TerminalStyle;
 /// Unchanged lines that the difference shows before and after a change.
 const CONTEXT: usize = 3;
 
-/// The change as a unified diff.
+/// The change of a text as a unified diff; `before` and `after` are the names in its header.
 pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
     TextDiff::from_lines(old, new)
         .unified_diff()
@@ -18,7 +18,7 @@ pub fn difference(old: &str, new: &str, [before, after]: [&str; 2]) -> String {
         .to_string()
 }
 
-/// A diff for the terminal.
+/// A diff with the colours of the terminal.
 pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
     let lines = difference.lines().map(|line| {
         // The lines with file names begin like added and removed lines, so they are tested first.
@@ -37,7 +37,7 @@ pub fn colour_diff(difference: &str, style: TerminalStyle) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// An effect as scripts read it.
+/// An effect as JSON: kind, places, parameters with name and nominal value, constants with value.
 pub fn effect_json(effect: &NewEffect) -> Value {
     let parameters = effect.parameters.iter().map(|one| {
         let said = json!({ "name": one.name, "nominal": one.nominal });

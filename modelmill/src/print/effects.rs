@@ -19,6 +19,7 @@ pub fn json(kinds: &[EffectKind]) -> Value {
 
 /// The kinds as a table, a line for each.
 pub fn kind_table(kinds: &[EffectKind]) -> Vec<String> {
+    // Name, places and expression fit into one line for most kinds.
     let rows: Vec<Vec<String>> = kinds
         .iter()
         .map(|kind| vec![kind.name.clone(), places(kind), addition_text(kind)])
@@ -50,9 +51,11 @@ fn unknown_kind_error(name: &str, kinds: &[EffectKind]) -> Error {
 
 /// Where a kind acts, in words.
 fn places(kind: &EffectKind) -> String {
+    // A kind may act on several sorts of places.
     let all: Vec<&str> = kind.on.iter().map(|on| on.description()).collect();
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
+        // Effects such as those of gears depend on a second place.
         (_, Some(other)) => format!(
             "{joined}, as a function of another place that {}",
             other.description()
@@ -77,7 +80,9 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
     lines.push(String::new());
     lines.push(format!("acts on  {}", places(kind)));
     lines.push(format!("adds     {}", addition_text(kind)));
+    // Parameters are identified, constants are fixed or searched.
     let mut symbols: Vec<Vec<String>> = Vec::new();
+    // Parameters come first, with the sign that they must have.
     for one in &kind.parameters {
         let sign = sign(one);
         symbols.push(vec![
@@ -90,7 +95,9 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
             one.note.clone(),
         ]);
     }
+    // Constants follow, with their default or the range of their search.
     for one in &kind.constants {
+        // A default stands in parentheses, as text of the library.
         let value = one.value.as_ref();
         let default = value.map_or_else(String::new, |v| format!(" ({v} if not given)"));
         symbols.push(vec![
@@ -114,6 +121,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
         ];
         lines.extend(table(0, &columns, &symbols));
     }
+    // The explanations of the library.
     for (head, text) in [
         ("what it is", &kind.explains),
         ("what it can be confused with", &kind.doubles),
@@ -130,6 +138,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
 /// Text in lines of at most `WIDTH` letters.
 fn wrap_text(text: &str, indent: usize) -> Vec<String> {
     let mut lines = vec![" ".repeat(indent)];
+    // A word longer than a line gets a line of its own.
     for word in text.split_whitespace() {
         let line = lines.last_mut().expect("there is a line");
         if line.chars().count() + 1 + word.chars().count() > WIDTH && line.trim() != "" {
@@ -167,6 +176,7 @@ fn search_text(constant: &KindConstant) -> String {
         None => String::new(),
         Some(ConstantSearch::Linear) => "estimated linearly".to_owned(),
         Some(ConstantSearch::Range { from, to, of }) => {
+            // Ranges may be relative to the motion of the place.
             let of = match of {
                 Scale::Rate => " times the largest rate",
                 Scale::Travel => " times the travel",
@@ -179,6 +189,7 @@ fn search_text(constant: &KindConstant) -> String {
 
 /// A kind as JSON.
 fn kind_json(kind: &EffectKind) -> Value {
+    // Units depend on whether the place is one of forces, torques or points.
     let by_place = |units: &[(PlaceLoad, String)]| -> Value {
         let name = |carries: &PlaceLoad| match carries {
             PlaceLoad::Force => "force",
@@ -191,6 +202,7 @@ fn kind_json(kind: &EffectKind) -> Value {
             .map(|(carries, unit)| (name(carries).to_owned(), json!(unit)));
         Value::Object(entries.collect())
     };
+    // The kinds of places on which the effect can act.
     let on = kind.on.iter().map(|on| match on {
         ActsOn::Drive => "drive",
         ActsOn::Coordinate => "coordinate",
@@ -211,6 +223,7 @@ fn kind_json(kind: &EffectKind) -> Value {
             "note": one.note,
         })
     });
+    // How a constant is found: linearly, by a search in a range, or not at all.
     let constants = kind.constants.iter().map(|one| {
         json!({
             "symbol": one.symbol,

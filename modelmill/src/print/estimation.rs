@@ -1,5 +1,5 @@
-//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights, parameters that
-//! are not essential, physical parameters, and the bias that instruments remove.
+//! Properties of an estimate besides its values, as JSON and as text for people: independent samples, weights,
+//! parameters that are not essential, physical parameters, and the bias that instruments remove.
 
 use modelmill_identify::ParameterInfo;
 use modelmill_identify::estimate::PhysicalParameters;
@@ -12,6 +12,7 @@ use crate::text::table::{ColumnAlignment, count, number, percent, significant, t
 
 /// Number of independent samples that the correlated ones are worth: the median over the parameters.
 fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
+    // Parameters without a finite number, such as known ones, are left out.
     let mut all: Vec<f64> = found
         .deviations
         .effective_samples
@@ -26,11 +27,13 @@ fn effective_samples(found: &RegressionEstimate) -> Option<f64> {
 
 /// The object `estimator` of `identify --json`.
 ///
-/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the residuals at lag 1 for
-/// each drive, `bandwidth` the lag (samples) up to which correlations are counted. With weights: `residual_scale` is the noise of
-/// each drive (N or N m). `prior`, `essential`, `physical` and `instruments` are there if the option was used.
+/// `effective_samples` is the number of independent samples, `residual_correlation` the correlation of the
+/// residuals at lag 1 for each drive, `bandwidth` the lag (samples) up to which correlations are counted. With
+/// weights: `residual_scale` is the noise of each drive (N or N m). `prior`, `essential`, `physical` and
+/// `instruments` are there if the option was used.
 pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOptions) -> Value {
     let drives = model.drives();
+    // Lists of values per drive become objects with the names of the drives.
     let by_drive = |values: &[f64]| -> Value {
         drives
             .iter()
@@ -39,6 +42,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
             .collect::<serde_json::Map<_, _>>()
             .into()
     };
+    // The correlation of residuals is always given, since the standard deviations depend on it.
     let mut value = json!({
         "weights": args.weights.name(),
         "effective_samples": effective_samples(found),
@@ -48,6 +52,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
     // Optional parts are added only if the estimator computed them.
     let mut put = |name: &str, what: Value| value[name] = what;
     if let Some(weighting) = &found.weighting {
+        // Weights by drive are iterated with the noise of each drive.
         put("residual_scale", by_drive(&weighting.scales));
         put("iterations", json!(weighting.iterations));
         put("settled", json!(weighting.converged));
@@ -63,6 +68,8 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         RefinementResult::Prior(sigma, beliefs) => {
             put("prior", json!({ "sigma": sigma, "constraints": beliefs }));
         }
+        // Each removed parameter with the reason: its relative standard deviation and the probability that it
+        // is zero.
         RefinementResult::Essential(dropped, rise) => {
             let dropped: Vec<Value> = dropped
                 .iter()
@@ -79,6 +86,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
                 json!({ "dropped": dropped, "residual_rise": rise }),
             );
         }
+        // Parameters and bodies; the rise of the residual is relative to the solution without bounds.
         RefinementResult::Physical(physical, bodies, before) => {
             let parameters = &model.derivation.mechanism.parameters;
             let list: Vec<Value> = parameters
@@ -107,6 +115,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         least_squares,
     }) = &found.instruments
     {
+        // Comparison of both estimators, parameter by parameter.
         let bias: Vec<Value> = (0..found.unknown.len())
             .map(|i| json!({ "name": model.base[found.unknown[i]].name, "least_squares": least_squares[i] }))
             .collect();
@@ -118,7 +127,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
     value
 }
 
-/// The same for people, line by line.
+/// The same as lines of text.
 pub(crate) fn text(
     model: &Model,
     found: &RegressionEstimate,
@@ -126,7 +135,9 @@ pub(crate) fn text(
 ) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
+    // Independent samples, since they explain the size of the standard deviations.
     if let Some(effective) = effective_samples(found) {
+        // One correlation for each drive.
         let correlations: Vec<String> = deviations
             .residual_lag1
             .iter()
@@ -141,7 +152,9 @@ pub(crate) fn text(
         ));
         lines.push("The standard deviations above allow for that.".to_owned());
     }
+    // Noise of each drive, if it was used as weight.
     if let Some(weighting) = &found.weighting {
+        // Drives with their noise in their own units.
         let scales: Vec<String> = weighting
             .scales
             .iter()
@@ -161,6 +174,7 @@ pub(crate) fn text(
                 ", not converged"
             }
         ));
+        // Robust weights reduce the influence of outliers.
         if let Some(bound) = weighting.huber {
             lines.push(format!(
                 "robust weights: {} of the residuals exceed {bound} times the noise (of normally distributed ones 18 % \
@@ -169,12 +183,14 @@ pub(crate) fn text(
             ));
         }
     }
+    // The refinement, if one was requested.
     let name = |i: usize| infos[found.unknown[i]].name.clone();
     match &found.refined {
         RefinementResult::Nothing => {}
         RefinementResult::Prior(_, beliefs) => {
-            lines.push(prior_text(*beliefs, found.unknown.len()))
+            lines.push(prior_text(*beliefs, found.unknown.len()));
         }
+        // Names of the parameters that were removed.
         RefinementResult::Essential(dropped, rise) => {
             let names: Vec<String> = dropped.iter().map(|one| name(one.parameter)).collect();
             lines.push(if names.is_empty() {
@@ -191,6 +207,7 @@ pub(crate) fn text(
             lines.extend(physical_text(model, physical, bodies, *before));
         }
     }
+    // Instruments, with the bias of least squares that they remove.
     if let Some(InstrumentStatistics {
         strength,
         least_squares,
@@ -200,6 +217,7 @@ pub(crate) fn text(
             "instruments: smallest correlation with the regressor {} (1 is ideal, below 0.2 is weak)",
             significant(*strength, 3)
         ));
+        // The difference of both estimates in standard deviations shows the bias.
         let rows: Vec<Vec<String>> = (0..found.unknown.len())
             .map(|i| {
                 let (value, std) = (found.solution.values[i], deviations.std[i]);
@@ -229,12 +247,13 @@ pub(crate) fn text(
     lines
 }
 
-/// A body is named as nearly impossible if the smallest eigenvalue of its pseudo-inertia matrix is below this part of that of the
-/// nominal body. By judgement.
+/// A body is named as nearly impossible if the smallest eigenvalue of its pseudo-inertia matrix is below this
+/// part of that of the nominal body. By judgement.
 const NEARLY_IMPOSSIBLE: f64 = 0.01;
 
 /// How many base parameters have a soft constraint at their nominal value.
 fn prior_text(beliefs: usize, unknown: usize) -> String {
+    // Parameters without nominal value cannot be constrained.
     let constrained = count(beliefs, "base parameter", "base parameters");
     let without = match unknown - beliefs {
         0 => String::new(),
@@ -253,9 +272,10 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// Below this share only rounding is left of it. By judgement.
 const PRINTED_AS_ZERO: f64 = 1e-6;
 
-/// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from nominal values and
-/// from the bounds of physical bodies.
+/// Share of a physical parameter that the recordings determine, between 0 and 1, as text. The rest comes from
+/// nominal values and from the bounds of physical bodies.
 fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
+    // Rounding must not be printed as a share.
     let share = physical.from_recording[i];
     if share < PRINTED_AS_ZERO {
         "0 %".to_owned()
@@ -266,8 +286,8 @@ fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
     }
 }
 
-/// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible. `before` is the
-/// residual norm without the bounds.
+/// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible.
+/// `before` is the residual norm without the bounds.
 fn physical_text(
     model: &Model,
     physical: &PhysicalParameters,
@@ -275,6 +295,7 @@ fn physical_text(
     before: f64,
 ) -> Vec<String> {
     let parameters = &model.derivation.mechanism.parameters;
+    // One row for each parameter, with the share that the recordings determine.
     let rows: Vec<Vec<String>> = parameters
         .iter()
         .enumerate()
@@ -297,6 +318,7 @@ fn physical_text(
         .collect();
     let is_of_effect = |name: &&String| of_effects.contains(&name.as_str());
     let others = bodies.iter().filter(is_of_effect).count();
+    // The head says how much the bounds cost.
     let mut lines = vec![
         format!(
             "physical parameters of {}, all physically possible{}; the residual grows by {}",
@@ -324,6 +346,7 @@ fn physical_text(
         ],
         &rows,
     ));
+    // The table uses this phrase, so that its meaning is stated once below.
     if (0..rows.len()).any(|i| recording_share_text(physical, i) == NOT_ALONE) {
         lines.push(format!(
             "{NOT_ALONE}: the recordings determine sums of this parameter and others, not the parameter itself; its value and \

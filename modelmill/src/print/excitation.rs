@@ -18,14 +18,15 @@ impl ExcitationResult {
 
     /// The trajectory and its quality as one JSON object.
     ///
-    /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number` with columns of
-    ///   equal norm
+    /// - `condition_number` of the regressor, `start` for the best random trajectory, `scaled_condition_number`
+    ///   with columns of equal norm
     /// - `value` and `ends`: the criterion at the result and at the end of each start
     /// - `limits`: the part of each limit that is used (1), and whether it is proven for all times
     /// - `coefficients`: offset and Fourier coefficients of each coordinate (m or rad); `period` is in s
     pub fn json(&self) -> Value {
         let found = &self.found;
         let names = &self.coordinates;
+        // The trajectory is `offset + sum of mu and nu terms` of each coordinate.
         let coefficients = names.iter().zip(&found.series).map(|(name, series)| {
             let one = json!({ "offset": series.offset, "mu": series.mu, "nu": series.nu });
             (name.clone(), one)
@@ -69,15 +70,17 @@ impl ExcitationResult {
         })
     }
 
-    /// The same for people.
+    /// The trajectory as text: quality first, then the use of its limits.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let found = &self.found;
+        // The head has what was asked for.
         let mut lines = vec![style.bold(&format!(
             "{}: {} of {} s",
             self.model,
             count(self.options.harmonics, "harmonic", "harmonics"),
             self.options.period
         ))];
+        // The goal of the search decides which figures are printed.
         if let Some(separated) = &self.separated {
             lines.extend(separated.text(found.evaluations, found.feasible_starts, spelling));
         } else {
@@ -91,6 +94,7 @@ impl ExcitationResult {
     /// How well the trajectory determines the base parameters.
     fn conditions(&self) -> Vec<String> {
         let found = &self.found;
+        // The best random trajectory shows what the search gained.
         let mut lines = vec![format!(
             "  condition number {}; {} for the best of {} ({} times better)",
             number(found.condition_number),
@@ -102,6 +106,7 @@ impl ExcitationResult {
             ),
             significant(found.start_condition_number / found.condition_number, 3),
         )];
+        // Scaled columns make the number independent of units.
         if let Some(scaled) = self.scaled {
             lines.push(format!(
                 "  {} after scaling the columns to equal norm; {} evaluated",
@@ -115,6 +120,7 @@ impl ExcitationResult {
     /// How close the trajectory comes to its limits.
     fn limits(&self) -> Vec<String> {
         let found = &self.found;
+        // A limit is kept at all times if a bound proves it, otherwise at the samples of a fine grid.
         let rows: Vec<Vec<String>> = found
             .margins
             .iter()

@@ -1,5 +1,5 @@
-//! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step, effects, disturbances,
-//! rejected candidates and next steps.
+//! Findings of a diagnosis, as JSON for scripts and as text for people: verdict, errors after each step,
+//! effects, disturbances, rejected candidates and next steps.
 
 use modelmill_identify::diagnose::{DiagnosisVerdict, LocatedEffect, SelectionStep};
 use serde_json::{Map, Value, json};
@@ -23,8 +23,8 @@ impl DiagnosisFindings {
     /// - `disturbances`: faults of the recordings, with estimates and times (`interval`, s)
     /// - `steps`: errors after each added effect, on fitted (`fit`) and validation data (`check`)
     /// - `effects`: missing effects with estimates, probability and alternatives
-    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains alone and the reason
-    ///   of its rejection
+    /// - `candidates`: all effects that were tried, with the share of the squared error that each explains
+    ///   alone and the reason of its rejection
     /// - `untold`: effects that the recordings can neither show nor exclude
     /// - `laws`: hypotheses for the residual
     /// - `parameters_off_nominal`: base parameters that differ from the file, in standard deviations (`sigmas`)
@@ -33,8 +33,11 @@ impl DiagnosisFindings {
     /// - `with_nominal_parameters`: the diagnosis with all parameters fixed
     pub fn json(&self, spelling: &dyn StepSpelling) -> Value {
         let diagnosis = &self.diagnosis;
+        // Values are by drive, in the order of the model.
         let channels = self.channels();
         let model = &self.before.model;
+        // Missing effects with the motion that would separate them from their alternatives. Kinds and places have
+        // the names of the model file.
         let effects: Vec<Value> = (self.missing.iter())
             .map(|missing| {
                 let separation = missing.separation.as_ref();
@@ -49,11 +52,14 @@ impl DiagnosisFindings {
                 })
             })
             .collect();
+        // All candidates, including those that were found; they have no rejection reason. A script can sort them
+        // by either share.
         let candidates: Vec<Value> = (diagnosis.candidates.iter())
             .map(|c| {
                 json!({"kind": c.effect.kind, "at": c.effect.at, "explained": c.explained, "gain": c.gain, "refused": c.rejection_reason})
             })
             .collect();
+        // Base parameters that differ from the file.
         let off: Vec<Value> = (self.off_nominal.iter())
             .map(|off| {
                 let p = &off.parameter;
@@ -63,6 +69,7 @@ impl DiagnosisFindings {
         // Parts of the residual are relative to the rms force of the drive.
         let budget: Map<String, Value> = (channels.iter().zip(&diagnosis.budgets).enumerate())
             .map(|(d, (channel, budget))| {
+                // A drive without force has no relative parts.
                 let part = |x: f64| {
                     if budget.force > 0.0 {
                         x / budget.force
@@ -80,6 +87,7 @@ impl DiagnosisFindings {
                 (channel.clone(), value)
             })
             .collect();
+        // Disturbances with estimates, recordings and times.
         let disturbances: Vec<Value> = (diagnosis.disturbances.iter())
             .map(|one| {
                 json!({
@@ -94,9 +102,11 @@ impl DiagnosisFindings {
                 })
             })
             .collect();
+        // Drives whose residual is repeatable, so that a model could explain it.
         let unexplained: Vec<Value> = (diagnosis.unexplained.iter())
             .map(|d| json!({"channel": channels[*d], "reproducible": diagnosis.repeatable_share[*d]}))
             .collect();
+        // Keys are part of the interface; their meaning is listed above.
         json!({
             "model": model.name,
             "verdict": diagnosis.verdict,
@@ -126,7 +136,7 @@ impl DiagnosisFindings {
         })
     }
 
-    /// The answer for people, line by line.
+    /// The findings as lines of text, the verdict first.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn StepSpelling) -> Vec<String> {
         let diagnosis = &self.diagnosis;
         let channels = self.channels();
@@ -136,6 +146,7 @@ impl DiagnosisFindings {
             .collect();
         lines.push(String::new());
         lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
+        // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
             .map(|rung| {
                 vec![
@@ -154,6 +165,7 @@ impl DiagnosisFindings {
             ],
             &rows,
         ));
+        // The noise floor follows the table, as the lower bound of all errors.
         lines.push(format!("  {}", words::noise_floor_text(diagnosis)));
         self.missing_text(style, spelling, &mut lines);
         self.disturbances_text(style, &mut lines);
@@ -177,7 +189,8 @@ impl DiagnosisFindings {
         self.refused_text(style, &mut lines);
         self.undecided_text(style, &mut lines);
         self.off_nominal_text(style, spelling, &mut lines);
-        // Entries to add first, then advice for what a model file cannot contain.
+        // Entries to add first, then advice for what a model file cannot contain. Steps are commands or calls,
+        // depending on the reader.
         let mut next: Vec<String> = (self.entries_to_add().iter())
             .map(|entry| spelling.spell_effect(&self.before.model, entry))
             .collect();
@@ -187,6 +200,7 @@ impl DiagnosisFindings {
             lines.push(style.bold("Next steps"));
             lines.extend(next.iter().map(|line| format!("  {line}")));
         }
+        // Effects that were found may contradict the model file.
         if let Err(says) = &self.after
             && !says.is_empty()
         {
@@ -213,8 +227,10 @@ impl DiagnosisFindings {
         lines.push(String::new());
         lines.push(style.bold("Remaining error of each drive, % of its force (rms)"));
         let part = |x: f64, force: f64| percent((force > 0.0).then(|| x / force));
+        // Parts of the residual of each drive, relative to its force.
         let rows: Vec<Vec<String>> = (self.channels().iter().zip(&diagnosis.budgets))
             .map(|(channel, budget)| {
+                // Noise, what does not repeat, and what a model could explain.
                 let of = |x: f64| part(x, budget.force);
                 vec![
                     channel.clone(),
@@ -236,8 +252,8 @@ impl DiagnosisFindings {
         ));
     }
 
-    /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind means and how to
-    /// separate it are printed once, at its first place.
+    /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
+    /// means and how to separate it are printed once, at its first place.
     fn missing_text(
         &self,
         style: TerminalStyle,
@@ -249,11 +265,13 @@ impl DiagnosisFindings {
         }
         lines.push(String::new());
         lines.push(style.bold("Missing effects"));
+        // Each kind is explained at its first place only.
         let mut explained: Vec<&str> = Vec::new();
         for found in &self.missing {
             let name = found.effect.kind.as_str();
             let is_first = !explained.contains(&name);
             explained.push(name);
+            // Values with standard deviations and units.
             let values: Vec<String> = (found.estimates.iter())
                 .map(|e| {
                     let std = e
@@ -270,6 +288,7 @@ impl DiagnosisFindings {
                 values.join(", ")
             ));
             // Kinds of the libraries have a text of their own; others are explained here.
+            // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
             let meaning = kind.map_or_else(
@@ -279,6 +298,7 @@ impl DiagnosisFindings {
             if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
             }
+            // Alternatives follow with the motion that would distinguish them.
             if !found.indistinguishable_from.is_empty() {
                 lines.push(format!(
                     "    With these recordings it is not distinguishable from {}.",
@@ -350,6 +370,7 @@ impl DiagnosisFindings {
                 None => groups.push((one, vec![&one.effect])),
             }
         }
+        // One place has its own text; several places share one.
         for (first, effects) in groups {
             let (title, experiment) = match effects.as_slice() {
                 [one] => (words::effect(one), first.separating_experiment.clone()),
@@ -379,6 +400,7 @@ impl DiagnosisFindings {
         if self.off_nominal.is_empty() {
             return;
         }
+        // The difference is given in standard deviations, so that its size can be judged.
         let rows: Vec<Vec<String>> = (self.off_nominal.iter())
             .map(|off| {
                 let p = &off.parameter;
@@ -410,6 +432,7 @@ impl DiagnosisFindings {
             "  Possible causes: a payload, a misplaced mass or a wrong length that the nominal values do not contain."
                 .to_owned(),
         );
+        // A second diagnosis with fixed parameters shows which effects could explain the differences.
         let Some(held) = &self.with_nominal else {
             return;
         };

@@ -1,5 +1,5 @@
-//! Result of an identification, as JSON for scripts and as text for people: base parameters with standard deviations, errors
-//! and the next step.
+//! Result of an identification, as JSON for scripts and as text for people: base parameters with standard
+//! deviations, errors and the next step.
 
 use modelmill_identify::ParameterStatus;
 use serde_json::{Value, json};
@@ -13,10 +13,13 @@ use crate::text::table::{count, significant};
 
 impl Identification {
     /// The fit with all figures as one JSON object, from which [`modelmill_identify::FitFile`] is read again.
+    ///
+    /// Fails when the fit cannot be written as JSON.
     pub fn json(&self, model: &Model, spelling: &dyn RemedySpelling) -> Outcome<Value> {
         let value = serde_json::to_value(&self.fit);
         let mut value = value.map_err(|error| Error::input(error.to_string()))?;
         if let Some(object) = value.as_object_mut() {
+            // Notes contain remedies, which are spelled for the reader.
             if let Some(data) = object.get_mut("data") {
                 *data = notes(&self.fit.data, spelling);
             }
@@ -29,6 +32,7 @@ impl Identification {
                 "estimator".to_owned(),
                 estimation::json(model, &self.found, &self.options),
             );
+            // Periods exist for periodic recordings only.
             if !self.repeats.is_empty() {
                 let repeats = self
                     .repeats
@@ -41,7 +45,7 @@ impl Identification {
         Ok(value)
     }
 
-    /// The result for people.
+    /// The result as text: parameters, quality of the estimate, errors, and the next step.
     pub fn text(
         &self,
         model: &Model,
@@ -50,6 +54,7 @@ impl Identification {
     ) -> String {
         let fit = &self.fit;
         let estimator = estimation::text(model, &self.found, &model.parameter_infos());
+        // Parameters known from the file are not counted as identified.
         let identified = fit
             .parameters
             .iter()
@@ -65,6 +70,7 @@ impl Identification {
         lines.push(String::new());
         lines.extend(tables::parameters(&fit.parameters));
         lines.push(String::new());
+        // The condition number shows whether the motion excites all parameters.
         lines.push(format!(
             "  condition number {} ({} after scaling the columns to equal norm; below 100 is good)",
             fit.condition_number

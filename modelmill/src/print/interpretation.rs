@@ -19,6 +19,7 @@ impl InterpretationResult {
     pub fn json(&self) -> Value {
         let parameters = &self.model.derivation.mechanism.parameters;
         let names = self.names();
+        // A value is plausible if its sign is possible.
         let solution = |one: &PhysicalSolution| -> Value {
             let entries = names.iter().enumerate().map(|(i, name)| {
                 let parameter = &parameters[self.unknown[i]];
@@ -33,6 +34,7 @@ impl InterpretationResult {
             });
             Value::Object(entries.collect::<Map<_, _>>())
         };
+        // Residuals show which base parameters contradict the solution.
         let residuals = |one: &PhysicalSolution| -> Value {
             let entries = self.used.iter().zip(&one.residuals);
             let entries = entries.map(|(k, r)| (self.model.base[*k].name.clone(), json!(r)));
@@ -67,7 +69,7 @@ impl InterpretationResult {
         })
     }
 
-    /// The same for people.
+    /// The solutions as text, each as a table, after a headline with the method.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
         let unknowns = count(
@@ -76,6 +78,7 @@ impl InterpretationResult {
             "unknown parameters",
         );
         let equations = count(self.used.len(), "base parameter", "base parameters");
+        // The headline states the method, and for exact solutions that there are no others.
         let head = match &self.found {
             PhysicalInterpretation::Undetermined { .. } => format!(
                 "{}: {equations} do not determine {unknowns}",
@@ -100,9 +103,11 @@ impl InterpretationResult {
             ),
         };
         let mut lines = vec![style.bold(&head)];
+        // Undetermined directions are listed before any solution.
         for says in self.undetermined_directions() {
             lines.push(format!("  {says}."));
         }
+        // Each direction needs one more known parameter.
         if !self.directions().is_empty() {
             let how = message!(
                 "  Fix one parameter of each line at its nominal value: leave it out of {}.",
@@ -110,12 +115,14 @@ impl InterpretationResult {
             );
             lines.push(how.spell(spelling));
         }
+        // Exact equations may have complex solutions only.
         if let (PhysicalInterpretation::Exact { .. }, []) = (&self.found, solutions) {
             lines.push(
                 "  No real values of these parameters give the base parameters. Fix other parameters at their nominal values."
                     .to_owned(),
             );
         }
+        // Solutions are numbered if there are several.
         for (k, one) in solutions.iter().enumerate() {
             lines.push(String::new());
             if solutions.len() > 1 {
@@ -129,9 +136,11 @@ impl InterpretationResult {
         lines.join("\n")
     }
 
-    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are not plausible.
+    /// A solution as a table: nominal and solved values, standard deviations, and objections to values that are
+    /// not plausible.
     fn table(&self, one: &PhysicalSolution) -> Vec<String> {
         let parameters = &self.model.derivation.mechanism.parameters;
+        // The last column is empty unless a value is impossible.
         let rows: Vec<Vec<String>> = (0..self.unknown.len())
             .map(|i| {
                 let parameter = &parameters[self.unknown[i]];
@@ -181,6 +190,7 @@ impl InterpretationResult {
             ("unit", ColumnAlignment::Left),
         ];
         let mut lines = table(2, &columns, &rows);
+        // The sum of squares in standard deviations judges the fit as a whole.
         if let Some(chi_squared) = one.chi_squared {
             lines.push(format!("  chi^2 {}", number(chi_squared)));
         }

@@ -23,6 +23,7 @@ pub(super) fn laws(
     spelling: &dyn StepSpelling,
 ) -> Vec<Value> {
     let one = |hypothesis: &LawHypothesis| {
+        // `near_ties` has the labels of the alternatives, `ties` all of them in full.
         let mut object = law(&hypothesis.law, model, spelling);
         let ties = hypothesis.near_ties.iter();
         object["near_ties"] = ties.clone().map(|tie| json!(tie.label())).collect();
@@ -49,7 +50,7 @@ fn law(law: &ProposedLaw, model: &Model, spelling: &dyn StepSpelling) -> Value {
     })
 }
 
-/// Laws for people, line by line.
+/// Laws as lines of text.
 pub(super) fn text(
     laws: &[LawHypothesis],
     model: &Model,
@@ -63,6 +64,7 @@ pub(super) fn text(
     lines.push(String::new());
     lines.push(style.bold("Laws that would explain the residual (hypotheses, to be tested)"));
     for hypothesis in laws {
+        // Expression, values, and the share that it explains.
         let law = &hypothesis.law;
         lines.push(format!("  {}", law.label()));
         lines.push(format!("    {}", values(law)));
@@ -74,6 +76,7 @@ pub(super) fn text(
                 lines.push(format!("      {}", tie.label()));
             }
         }
+        // A law without memory has an entry for a library and the step that adds it.
         match &law.entry {
             Some(entry) => {
                 lines.push(format!("    As a library file, {LIBRARY}:"));
@@ -115,6 +118,7 @@ pub(crate) fn gain(law: &ProposedLaw) -> String {
         "explains {} of the squared residual on data that were not fitted",
         percent(Some(law.gain))
     );
+    // A law may replace several effects that approximate it.
     if !law.instead_of.is_empty() {
         says.push_str(", and makes these effects unnecessary: ");
         says.push_str(&words::effects(&law.instead_of));

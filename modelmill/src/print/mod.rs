@@ -1,5 +1,5 @@
-//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for people; none reads
-//! files or computes.
+//! Output of results. Each module takes one value of the library and returns JSON for scripts and text for
+//! people; none reads files or computes.
 
 mod changes;
 mod comparison;
@@ -13,6 +13,7 @@ mod identification;
 mod interpretation;
 pub(crate) mod laws;
 mod next_step;
+#[cfg(feature = "import")]
 mod reduction;
 mod runs;
 mod spelling;

@@ -19,7 +19,7 @@ impl RigReduction {
         })
     }
 
-    /// The same for people.
+    /// The same as text: the report of the reduction, and the error of each drive's force.
     pub fn text(&self) -> String {
         let mut text = self.reduction.report.text();
         text.push_str(

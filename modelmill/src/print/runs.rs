@@ -22,17 +22,20 @@ impl RunsComparison {
     /// - `per_run`: the joint fit in which runs have some values for themselves, if it was requested
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
+        // All figures are relative to the first run.
         let moved = later().flat_map(|(k, run)| {
             run.moved
                 .iter()
                 .map(move |p| self.moved_parameter_json(k, *p))
         });
         let all = self.runs.iter().enumerate();
+        // Events within the first run are listed as well, with the pair of indices 0 and 0.
         let changes =
             all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
         let unread =
             unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        // Each run with its own fit.
         let runs = self.runs.iter().map(|run| {
             json!({
                 "file": run.file,
@@ -54,6 +57,7 @@ impl RunsComparison {
 
     /// A lasting change as JSON: the run from which on it is there, means before and since, and physical causes.
     fn point_json(&self, point: &ChangePoint) -> Value {
+        // Means of each parameter before and since the change.
         let steps = point.steps.iter().map(|step| {
             json!({
                 "parameter": self.parameters[step.parameter].name,
@@ -74,14 +78,18 @@ impl RunsComparison {
 
     /// The joint fit, in which some values are shared and each run has others for itself.
     fn shared_json(&self, fit: &SharedFit) -> Value {
+        // Names and units come from the model.
         let shared = self.parameters.iter().zip(&fit.shared);
+        // Base parameters that are separate for each run are not in the shared list.
         let shared = shared.filter_map(|(info, value)| {
             let value = (*value)?;
             Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
         });
+        // Factors of force signals, which need a known load.
         let gains = fit.gains.iter().map(
             |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
         );
+        // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
                 json!({
@@ -104,6 +112,7 @@ impl RunsComparison {
 
     /// Base parameters with one fitted value each as JSON.
     fn parameters_json(&self, fitted: &[FittedValue]) -> Vec<Value> {
+        // A parameter that the run does not determine has no standard deviation.
         let pairs = self.parameters.iter().zip(fitted);
         let one = |(info, fitted): (&ParameterInfo, &FittedValue)| {
             json!({
@@ -119,6 +128,7 @@ impl RunsComparison {
 
     /// A base parameter of a run that differs from that of the first.
     fn moved_parameter_json(&self, run: usize, k: usize) -> Value {
+        // Both values are from separate fits, so their errors are independent.
         let (before, now) = (self.runs[0].alone[k], self.runs[run].alone[k]);
         let deviation = before.difference_deviation(now);
         json!({
@@ -132,7 +142,7 @@ impl RunsComparison {
         })
     }
 
-    /// The same for people.
+    /// The comparison as text: lasting changes, joint fit, and each run.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let [first, later @ ..] = &self.runs[..] else {
             return String::new();
@@ -150,6 +160,7 @@ impl RunsComparison {
         if let Some(shared) = &self.shared {
             write_shared_fit(shared, &mut lines, style);
         }
+        // Changes of the first run are its contacts and pushes.
         if !first.changes.is_empty() {
             lines.push(String::new());
             lines.push(style.bold(&first.file));
@@ -163,6 +174,7 @@ impl RunsComparison {
             }
             self.write_change_points(&mut lines, style);
         }
+        // Files that could not be evaluated come last, with the reason.
         for one in &self.unread {
             lines.push(String::new());
             let why = one.error.spell(spelling);
@@ -193,6 +205,7 @@ impl RunsComparison {
         }
         if !run.moved.is_empty() {
             lines.push("  Base parameters that changed (each run fitted separately):".to_owned());
+            // Parameters before and now, with the standard deviation of the difference.
             let rows: Vec<Vec<String>> = run
                 .moved
                 .iter()
@@ -293,9 +306,11 @@ fn write_many_runs(later: &[RunReport], lines: &mut Vec<String>, style: Terminal
 /// A change as JSON; `between` are the indices of both runs.
 fn change_json(between: [usize; 2], change: &RunChange) -> Value {
     let (kind, at, estimates) = change.change.parts(change.unit);
+    // Sizes of the change with standard deviations.
     let estimates = estimates.iter().map(|(name, estimate, unit)| {
         json!({ "name": name, "value": estimate.value, "std": estimate.deviation, "unit": unit })
     });
+    // Only contacts have a time.
     let interval = match &change.change {
         PhysicalChange::ContactEvent { interval, .. } => Some(interval),
         _ => None,
@@ -315,11 +330,13 @@ fn change_json(between: [usize; 2], change: &RunChange) -> Value {
 /// The joint fit: factors of force signals, and values that each run has for itself.
 fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalStyle) {
     lines.push(String::new());
+    // Base parameters that are separate for each run are not counted.
     let n = fit.shared.iter().flatten().count();
     lines.push(style.bold(&format!(
         "Joint fit of all runs, with {} shared",
         count(n, "base parameter", "base parameters")
     )));
+    // A value without standard deviation was not determined.
     let text = |value: FittedValue| match value.deviation {
         Some(deviation) => with_deviation(value.value, deviation),
         None => ["not identifiable".to_owned(), String::new()],
@@ -328,6 +345,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         lines.push(
             "  Factors of the force signals (true force = factor times measured force):".to_owned(),
         );
+        // One row for each drive.
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
             .collect();
@@ -338,8 +356,10 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         ];
         lines.extend(table(4, &columns, &rows));
     }
+    // Runs without values of their own are left out.
     for (file, values) in fit.runs.iter().filter(|(_, values)| !values.is_empty()) {
         lines.push(format!("  {file}"));
+        // A change relative to the first run is marked as such.
         let row = |one: &RunValue| {
             let [value, deviation] = text(one.value);
             let against = if one.is_against_first {
@@ -358,6 +378,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
             .map(str::to_owned)
             .to_vec()
         };
+        // Values that a run does not determine are listed below the table.
         let known = values.iter().filter(|one| one.value.deviation.is_some());
         let rows: Vec<Vec<String>> = known.map(row).collect();
         let columns = [

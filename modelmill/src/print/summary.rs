@@ -1,8 +1,10 @@
-//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid file as JSON.
+//! Output of `check`: contents of a model file as JSON and as text for people, and the errors of an invalid
+//! file as JSON.
 
 use modelmill_boundary::text::plain;
 use modelmill_codegen::review::NumericMethod;
-use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod, module_name};
+use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
+use modelmill_emit::module_name;
 use modelmill_spec::{
     CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel,
     Mechanism, SourceFiles,
@@ -20,7 +22,8 @@ impl ModelCheck {
         let model = &self.model;
         let loaded = &model.loaded;
         let mut warnings = self::warnings(loaded, spelling);
-        // Warnings of the derivation come after those of the file.
+        // Warnings of the derivation come after those of the file: retained products that the reduction could not
+        // use.
         let in_vain = ineffective_retained(&model.derivation).into_iter();
         warnings.extend(in_vain.map(|(k, says)| {
             let span = loaded.retain.get(k);
@@ -33,6 +36,7 @@ impl ModelCheck {
                 "column": place.map(|p| p.1),
             })
         }));
+        // A reduction for one geometry and a rank that is uncertain.
         let caution = model.derivation.reduction.method.caution();
         let judged = caution.iter().chain(&self.warnings);
         warnings.extend(
@@ -81,6 +85,7 @@ fn diagnostics(
     found
         .iter()
         .map(|one| {
+            // Files that are included have their own path.
             let place = one.span.map(|span| {
                 let (line, column) = sources.line_and_column(span);
                 let file = sources.files.get(span.file);
@@ -103,6 +108,7 @@ fn diagnostics(
 }
 
 impl ModelSummary {
+    /// Contents as one JSON object; `warnings` are those of file and derivation.
     fn json(&self, name: &str, derivation: &Derivation, warnings: &[Value]) -> Value {
         json!({
             "model": name,
@@ -125,6 +131,7 @@ impl ModelSummary {
         })
     }
 
+    /// Contents as lines of text, each with a name in front; lists are omitted if they are empty.
     fn text(
         &self,
         name: &str,
@@ -133,10 +140,12 @@ impl ModelSummary {
         style: TerminalStyle,
     ) -> String {
         let m = &derivation.mechanism;
+        // The file is valid, otherwise its errors would be printed.
         let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
         if let Some(title) = &m.title {
             lines.push(format!("  {}", plain(title)));
         }
+        // Each line begins with what it counts, padded to one width.
         let mut line = |what: &str, text: String| lines.push(format!("  {what:<20}{text}"));
         let list = |names: &[String]| match names {
             [] => String::new(),
@@ -151,9 +160,11 @@ impl ModelSummary {
         };
         line("module", format!("{module} ({whose})"));
         line("bodies", self.bodies.to_string());
+        // Most models have none.
         if self.lumped_masses > 0 {
             line("lumped masses", self.lumped_masses.to_string());
         }
+        // Joints are named with their motion, since most are revolute.
         let joints: Vec<String> = m
             .coordinates
             .iter()
@@ -168,12 +179,14 @@ impl ModelSummary {
             "actuators",
             format!("{}{}", self.drives.len(), list(&drives(m, true))),
         );
+        // Rows of the equations without a drive have force zero.
         if !self.undriven.is_empty() {
             line(
                 "undriven",
                 format!("{}{}", self.undriven.len(), list(&drives(m, false))),
             );
         }
+        // Each row of the equations belongs to one degree of freedom.
         line("degrees of freedom", m.drives.len().to_string());
         if !self.effects.is_empty() {
             line(
@@ -185,6 +198,7 @@ impl ModelSummary {
             "parameters",
             format!("{}{}", self.parameters.len(), list(&self.parameters)),
         );
+        // Numbers of products and of their combinations that can be identified.
         let reduction = &derivation.reduction;
         line(
             "p_g and p_min",
@@ -198,6 +212,7 @@ impl ModelSummary {
                 ),
             ),
         );
+        // A reduction for one geometry only is stated, since its base is not general.
         match reduction.method {
             ReductionMethod::Numeric { .. } => line(
                 "reduced",
@@ -244,6 +259,7 @@ fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
 
 /// Drives with the joint or the points between which they act, either the actuated or the undriven ones.
 fn drives(m: &Mechanism, is_driven: bool) -> Vec<String> {
+    // Drives beyond the degrees of freedom are listed with the others.
     let shared = m.shared_drives.iter();
     m.drives
         .iter()

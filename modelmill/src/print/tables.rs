@@ -21,6 +21,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
                 } else {
                     format!("({})", number(p.value))
                 },
+                // A parameter that was not identified says why.
                 match (p.status, p.std) {
                     (ParameterStatus::Known, _) => "known".to_owned(),
                     (ParameterStatus::NotEssential, _) => "not essential".to_owned(),
@@ -28,6 +29,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
                     (ParameterStatus::Identified, Some(std)) => significant(std, 2),
                     (ParameterStatus::Identified, None) => "—".to_owned(),
                 },
+                // A value of zero has no relative standard deviation.
                 p.std.map_or_else(String::new, |std| {
                     if p.value == 0.0 {
                         "-".to_owned()
@@ -55,6 +57,7 @@ pub fn parameters(parameters: &[FitParameter]) -> Vec<String> {
 
 /// Expressions of the base parameters as JSON and fit files write them: `p1_min = ...`.
 pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
+    // The expression shows which physical parameters a base parameter combines.
     let indent = " ".repeat(indent);
     let lines = model.base.iter();
     lines
@@ -62,10 +65,12 @@ pub fn expressions(indent: usize, model: &Model) -> Vec<String> {
         .collect()
 }
 
-/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line for each drive.
-/// Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit used follow as a second table.
+/// Error figures of several comparisons: a line for all drives together, where they have one unit, and a line
+/// for each drive. Errors are in the unit of the force, `nrms` and its like relative to it. The rows that a fit
+/// used follow as a second table.
 pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     let mut rows = Vec::new();
+    // The name stands in the first row of its comparison only.
     for (name, figures) in named {
         let mut name = (*name).to_owned();
         // A total needs one unit: forces and torques are not added up.
@@ -85,7 +90,9 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
                 common_unit(figures),
             ]);
         }
+        // One row for each drive, with its error in the band if there is one.
         for (channel, one) in &figures.channels {
+            // The band is the same for all drives.
             let band = figures.band.as_ref();
             let band = band.and_then(|band| band.channels.get(channel));
             rows.push(vec![
@@ -101,6 +108,7 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
             ]);
         }
     }
+    // Relative errors come first, absolute ones after them.
     let mut lines = table(
         2,
         &[
@@ -131,12 +139,14 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
 
 /// Errors on the rows that the fits used, after low-pass and decimation: a column for each comparison that has them.
 fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
+    // Only fits after decimation have rows of their own.
     let fits = named.iter();
     let fits = fits.filter_map(|(name, figures)| Some((*name, figures.rows.as_ref()?)));
     let fits: Vec<_> = fits.collect();
     let Some((_, first)) = fits.first() else {
         return Vec::new();
     };
+    // A row has a title and one cell for each comparison.
     let row = |title: &str, cell: &dyn Fn(usize) -> String| {
         let cells = (0..fits.len()).map(cell);
         std::iter::once(title.to_owned()).chain(cells).collect()
@@ -146,6 +156,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         row("low-pass, Hz", &|k| significant(fits[k].1.cutoff_hz, 3)),
         row("nrms of all", &|k| percent(fits[k].1.nrms)),
     ];
+    // One line for each drive, one column for each comparison.
     for drive in first.channels.keys() {
         let cell = |k: usize| {
             let one = fits[k].1.channels.get(drive);
@@ -153,6 +164,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
         };
         rows.push(row(drive, &cell));
     }
+    // The comparisons are the columns.
     let heads = fits.iter().map(|(name, _)| (*name, ColumnAlignment::Right));
     let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left))
         .chain(heads)

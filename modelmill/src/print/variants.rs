@@ -21,11 +21,13 @@ const LEAST_SHARE: f64 = 0.01;
 impl VariantComparison {
     /// All figures as one JSON object, `before` and `after` for the two variants.
     ///
-    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the terms that cause the
-    ///   difference; their shares sum to 1, and `by_value` is the part of a share that comes from the new value
+    /// - `drives`: peak and rms force (N or N m), peak and rms power (W), positive and net work (J), and the
+    ///   terms that cause the difference; their shares sum to 1, and `by_value` is the part of a share that
+    ///   comes from the new value
     /// - `limits`: range of each limit and the part of it that is used (1)
     /// - `errors`: relative to measured forces, if the recordings have them
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
+        // Limits with the range in both files and the use by both models.
         let limits = self.limits.iter().map(|one| {
             let side = |m: usize| json!({ "range": one.ranges[m], "used": one.used[m] });
             json!({
@@ -46,8 +48,9 @@ impl VariantComparison {
         })
     }
 
-    /// The same for people, but for the notes.
+    /// The comparison as text, without its notes.
     pub fn text(&self, style: TerminalStyle) -> String {
+        // The motion on which both variants are compared.
         let mut lines = vec![style.bold(&format!(
             "along {}: {} in {} s",
             self.recordings.join(", "),
@@ -55,16 +58,20 @@ impl VariantComparison {
             significant(self.seconds, 3)
         ))];
         lines.push(String::new());
+        // Figures of both variants and their change.
         lines.push(style.bold("Forces and power of the drives"));
         lines.extend(efforts(&self.drives));
         lines.push(String::new());
+        // The terms that cause the difference, drive by drive.
         lines.push(style.bold("Causes of the difference"));
         for drive in &self.drives {
             lines.extend(shares(drive));
         }
         lines.push(String::new());
+        // Exceeded limits, and the most used of the others.
         lines.push(style.bold("Limits"));
         lines.extend(self.limits_text(style));
+        // Errors exist only if the recordings have forces.
         if self.errors.iter().any(Option::is_some) {
             lines.push(String::new());
             lines.push(style.bold("Error relative to the measured forces"));
@@ -81,6 +88,7 @@ impl VariantComparison {
             return vec!["  the files have no `[limits]`".to_owned()];
         }
         let mut lines = Vec::new();
+        // The worst changes come first.
         for crossing in [
             LimitCrossing::NowExceeded,
             LimitCrossing::StillExceeded,
@@ -115,7 +123,7 @@ impl VariantComparison {
     }
 }
 
-/// What the JSON calls it.
+/// The name of a limit's state in the JSON.
 fn crossing(crossing: LimitCrossing) -> &'static str {
     match crossing {
         LimitCrossing::NowExceeded => "now_exceeded",
@@ -127,6 +135,7 @@ fn crossing(crossing: LimitCrossing) -> &'static str {
 
 /// A drive as JSON.
 fn drive(one: &DriveVariants) -> Value {
+    // Units are N or N m, W and J.
     let effort = |effort: &DriveEffort| {
         let [peak, rms, peak_power, rms_power, work, net_work] = numbers(effort);
         json!({
@@ -138,6 +147,7 @@ fn drive(one: &DriveVariants) -> Value {
             "net_work": net_work,
         })
     };
+    // A term with its values in both models and its share.
     let term = |term: &TermShare| {
         json!({
             "term": term.term,
@@ -149,6 +159,7 @@ fn drive(one: &DriveVariants) -> Value {
             "by_value": term.by_value,
         })
     };
+    // Terms are grouped by their product of parameters.
     let products = one.products.iter().map(|product| {
         json!({
             "product": product.product,
@@ -168,11 +179,13 @@ fn drive(one: &DriveVariants) -> Value {
 
 /// One line of a limit: what each model uses of it.
 fn limit_line(one: &LimitUse) -> String {
+    // A model without this limit has no share.
     let used = one
         .used
         .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
     let range =
         |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
+    // Equal ranges are printed once.
     let range = match (range(0), range(1)) {
         (Some(a), Some(b)) if a == b => format!(" ({a})"),
         (None, None) => String::new(),
@@ -181,6 +194,7 @@ fn limit_line(one: &LimitUse) -> String {
             format!(" ({}, then {})", text(a), text(b))
         }
     };
+    // The state in words, in front of both shares.
     let says = match one.crossing() {
         LimitCrossing::NowExceeded => "is now exceeded: ",
         LimitCrossing::StillExceeded => "is exceeded by both: ",
@@ -201,12 +215,14 @@ fn part(used: f64) -> String {
 fn efforts(drives: &[DriveVariants]) -> Vec<String> {
     let mut rows = Vec::new();
     for one in drives {
+        // The unit follows the forces; powers and work have theirs in the head.
         let row = |drive: &str, which: &str, cells: [String; 6]| {
             let mut row = vec![drive.to_owned(), which.to_owned()];
             row.extend(cells);
             row.insert(4, one.unit.to_owned());
             row
         };
+        // Four digits show changes that matter.
         let shown = |effort: &DriveEffort| numbers(effort).map(|x| significant(x, 4));
         rows.push(row(&one.drive, "before", shown(&one.before)));
         rows.push(row("", "after", shown(&one.after)));
@@ -253,6 +269,7 @@ fn change(before: f64, after: f64) -> String {
     if by.abs() <= UNCHANGED * before.abs() {
         return "-".to_owned();
     }
+    // A change from zero has no percentage.
     let sign = if by > 0.0 { "+" } else { "-" };
     if before == 0.0 {
         return format!("{sign}{}", significant(by.abs(), 4));
@@ -262,6 +279,7 @@ fn change(before: f64, after: f64) -> String {
 
 /// Terms that cause the difference of a drive, the largest first.
 fn shares(one: &DriveVariants) -> Vec<String> {
+    // The size of the difference gives the shares a meaning.
     let size = one.difference;
     if one.products.is_empty() {
         return vec![format!("  {}: no difference", one.drive)];
@@ -273,6 +291,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         significant(size.rms, 4),
         unit = one.unit
     )];
+    // Products show the causes in groups, terms show each of them.
     if one.products.len() > 1 {
         let least = LEAST_SHARE * one.products[0].share.abs();
         let large = (one.products.iter()).take_while(|p| p.share.abs() >= least);
@@ -288,6 +307,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
         let all: Vec<String> = most.collect();
         lines.push(format!("    by product of p_g: {}{more}", all.join(", ")));
     }
+    // Shares may be negative, where a term reduces the difference.
     let mut terms: Vec<&TermShare> = one.products.iter().flat_map(|p| &p.terms).collect();
     terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
     let least = terms
@@ -332,6 +352,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
 
 /// A share in per cent with its sign.
 fn signed_percent(share: f64) -> String {
+    // A positive share has no sign.
     let size = percent(Some(share.abs()));
     if share < 0.0 {
         format!("-{size}")
@@ -340,7 +361,8 @@ fn signed_percent(share: f64) -> String {
     }
 }
 
-/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty without such a part.
+/// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty
+/// without such a part.
 fn column_share_text(term: &TermShare) -> String {
     let by_column = term.share - term.by_value;
     // A small rest is rounding of the split, not a change of geometry.
@@ -359,6 +381,7 @@ fn column_share_text(term: &TermShare) -> String {
 
 /// Value of a term, and the one before.
 fn value(term: &TermShare) -> String {
+    // Numbers without unit stand alone.
     let unit = match term.unit.as_str() {
         "1" | "" => String::new(),
         unit => format!(" {unit}"),

@@ -1,14 +1,15 @@
-//! How a recording is smoothed where nobody says how: candidates go in, the one that leaves least of the forces on held-out
-//! time comes out.
+//! Choice of the smoothing of a recording if the user gave none: candidates are tested, and the one with the smallest
+//! force residual on held-out parts of the run is taken.
 //!
-//! Spectra of positions alone cannot tell noise of clocks and encoders from motion; forces can. For each cut-off of a ladder
-//! the model's regressor, with friction and an offset of every drive beside, is fitted to the forces on four fifths of the
-//! time, both through one low-pass at the band of the motion, and held against the last fifth. A cut-off that is too low leaves
-//! of the forces what the model could explain, one that is too high hides it in noise. Octaves above the band count as far as
-//! the model explains anything of them. The figure is the geometric mean over the drives of what is left: the likelihood of
-//! errors whose size is not known, which knows no units. A motion that repeats itself may also be a Fourier series, whose
-//! harmonics are tried in the same way: it averages over the periods what a low-pass lets through. Local polynomials are no
-//! candidates: at the same cut-off they leave as much as the low-pass, on all recordings that were looked at.
+//! Spectra of positions alone cannot distinguish noise of clocks and encoders from motion; forces can. For each
+//! cut-off on a list, the model's regressor, with friction and an offset of every drive added, is fitted to the
+//! forces on four fifths of the time. Both sides pass one low-pass at the band of the motion, and the fit is compared
+//! with the last fifth. A cut-off that is too low leaves a residual that the model could explain; one that is too
+//! high hides it in noise. Octaves above the band count as far as the model explains part of them. The figure is the
+//! geometric mean of the residual over the drives: the likelihood of errors of unknown size, which does not depend on
+//! units. A periodic motion may also be fitted by a Fourier series, whose harmonics are tested in the same way: it
+//! averages over the periods what a low-pass lets through. Local polynomials are no candidates: at the same cut-off
+//! their residual equals that of the low-pass on all recordings that were examined.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -26,41 +27,44 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
 
-/// Ratio of neighbouring cut-offs.
+/// Ratio of successive cut-offs.
 const RATIO: f64 = 1.6;
-/// The highest cut-off, in parts of the sampling rate: beyond, differences take more than the filter leaves.
+/// The highest cut-off relative to the sampling rate: above it, differentiation amplifies more noise than the filter
+/// removes.
 const HIGHEST: f64 = 0.2;
-/// The same in parts of the band of the forces: noise above says nothing of them, and makes the model's forces rough.
+/// The highest cut-off relative to the band of the forces: noise above it says nothing about them, and roughens the
+/// model's forces.
 const FARTHEST: f64 = 8.0;
-/// The lowest cut-off, in parts of the band of the forces.
+/// The lowest cut-off, relative to the band of the forces.
 const LOWEST: f64 = 0.15;
-/// Parts of the time, each of which is held out once.
+/// Number of parts of the time, each of which is held out once.
 const FOLDS: usize = 5;
-/// Octaves above the band of the motion that are looked at.
+/// Number of octaves above the band of the motion that are evaluated.
 const OCTAVES: usize = 2;
-/// Samples that are looked at for each candidate, at most; beyond, windows are spread over the recording.
+/// Largest number of samples for each candidate; longer recordings are evaluated in windows.
 const LOOKED_AT: usize = 12_000;
-/// Samples in a period of the highest frequency that is looked at.
+/// Samples per period of the highest frequency that is evaluated.
 const FINE: f64 = 5.0;
-/// Windows of a long recording.
+/// Number of windows of a long recording.
 const WINDOWS: usize = 10;
-/// Periods of the band that are dropped at both ends of a stretch that is held out, and the part of it that may be dropped.
+/// Periods of the band that are dropped at both ends of a held-out part, and the largest share of it that may be
+/// dropped.
 const DROPPED: (f64, f64) = (1.5, 0.2);
-/// Bands of the parallel filter that are tried, in parts of the band of the forces.
+/// Passbands of the decimation that are tested, relative to the band of the forces.
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
-/// Samples beside a window, of those that are looked at, beyond which its low-pass remembers nothing.
+/// Samples next to a window, at the rate of the evaluation, beyond which the low-pass has no influence.
 const BEYOND: usize = 60;
-/// Fewest samples of a window.
+/// Smallest number of samples of a window.
 const FEWEST: usize = 40;
-/// What is left of a force below this part of it is rounding.
+/// A residual below this fraction of the force is rounding.
 const ROUNDING: f64 = 1e-6;
-/// A candidate must be better by this part of the error to be preferred to one that smooths more.
+/// A candidate must be better by this fraction of the error to be preferred to one that smooths more.
 const BETTER: f64 = 0.005;
-/// A cut-off that leaves so much more than the best ends the search downwards.
+/// A cut-off whose residual exceeds the smallest by this factor ends the search downwards.
 const HOPELESS: f64 = 1.5;
 
-/// The preparation with what was open settled, and what was chosen; nothing where nothing is open, or where forces do not
-/// tell.
+/// The reading options with all open choices of the preparation made, and a note on them; `None` if nothing is open,
+/// or if the recording has no forces to decide it.
 pub(super) fn choose_preparation(
     model: &Model,
     raw: &Raw,
@@ -83,28 +87,30 @@ pub(super) fn choose_preparation(
     }))
 }
 
-/// What is left of the forces on held-out time.
+/// Force residual on held-out parts.
 #[derive(Clone, Copy)]
 struct HeldOutResidual {
-    /// The logarithm of the geometric mean over the drives of what is left, in units of the forces.
+    /// The logarithm of the geometric mean of the residual over the drives, in units of the forces.
     figure: f64,
-    /// The geometric mean over the drives of their relative errors below the band of the motion.
+    /// The geometric mean of the relative residuals below the band of the motion over the drives.
     relative: f64,
 }
 
-/// Smoothers of one kind that were tried, the one that passes most first.
+/// Smoothers of one kind that were tested, in the order of decreasing bandwidth.
 struct SmootherTrials {
+    /// Each smoother with its residual.
     all: Vec<(SmootherCandidate, HeldOutResidual)>,
-    /// Which is the smoothest of those that leave nearly the least.
+    /// Index of the smoothest of those with nearly the smallest residual.
     best: usize,
 }
 
 impl SmootherTrials {
+    /// The chosen smoother with its residual.
     fn best(&self) -> (SmootherCandidate, HeldOutResidual) {
         self.all[self.best]
     }
 
-    /// What the neighbours of the best would cost, as words to be joined.
+    /// How the residual grows with the neighbours of the best, one phrase each.
     fn neighbours(&self) -> impl Iterator<Item = String> {
         let beside = [self.best.checked_sub(1), Some(self.best + 1)];
         beside.into_iter().flatten().filter_map(|at| {
@@ -115,7 +121,7 @@ impl SmootherTrials {
     }
 }
 
-/// How much more is left, of the difference of two figures.
+/// The change of the residual in per cent, from the difference of two figures.
 fn cost_text(difference: f64) -> String {
     let more = difference.exp() - 1.0;
     if more.abs() < 1e-3 {
@@ -127,14 +133,20 @@ fn cost_text(difference: f64) -> String {
     }
 }
 
+/// The search for the best smoother of one recording.
 struct SmootherSearch<'a> {
+    /// The model that is fitted.
     model: &'a Model,
+    /// The recording before preparation.
     raw: &'a Raw,
+    /// The options of the user.
     reading: &'a RecordingOptions,
+    /// The choices that are open, with rate, band and period of the motion.
     open: PreparationChoices,
 }
 
 impl SmootherSearch<'_> {
+    /// The options with the best smoother and decimation, and the note that states the choice.
     fn best_reading(&self) -> Option<(RecordingOptions, RecordingNote)> {
         let PreparationChoices {
             rate_hz,
@@ -142,6 +154,7 @@ impl SmootherSearch<'_> {
             cutoff_hz,
             period,
         } = self.open;
+        // The list of cut-offs goes up to three steps above the default, and down to the lowest.
         let highest = (HIGHEST * rate_hz).min(FARTHEST * band_hz);
         let lowest = (LOWEST * band_hz).min(cutoff_hz);
         let mut ladder = vec![cutoff_hz.min(highest)];
@@ -155,7 +168,7 @@ impl SmootherSearch<'_> {
             .into_iter()
             .map(SmootherCandidate::low_pass)
             .collect();
-        // The lowest cut-off drops most samples; what it leaves is looked at for all.
+        // The lowest cut-off loses the most samples at the ends, so that its windows exist for all candidates.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
         let filtered = self.try_smoothers(&ladder, &looked_at)?;
@@ -164,6 +177,7 @@ impl SmootherSearch<'_> {
             self.try_smoothers(&ladder, &looked_at)
         });
         let (low_pass, by_filter) = filtered.best();
+        // A series must be clearly better than the low-pass to be preferred.
         let is_better =
             |series: &SmootherTrials| series.best().1.figure < by_filter.figure - BETTER;
         let (tried, other) = match series {
@@ -190,25 +204,25 @@ impl SmootherSearch<'_> {
             }
             None => (filtered, None),
         };
+        // Decimation is chosen last, for the smoother that was found.
         let (smoother, left) = tried.best();
         let (decimate, left) = self.decimation(smoother, &looked_at).unwrap_or((1, left));
         let mut reading = self.reading.clone();
         smoother.apply_to(&mut reading.preparation);
         reading.preparation.decimate = decimate;
         reading.preparation.chosen = true;
+        // The note states how the residual changes with the alternatives.
         let mut others = vec![String::new()];
         others.extend(tried.neighbours().chain(other));
         let others = others.join(", ");
         let every = if decimate > 1 {
-            format!(
-                ", and one in {decimate} samples kept after the parallel filter on forces and regressor"
-            )
+            format!(", and decimated by {decimate} after a low-pass on forces and regressor")
         } else {
             String::new()
         };
         let says = message!(
-            "{} {}{every}, since that leaves least of the forces on held-out time: {} below {} Hz (geometric mean over the \
-             drives){others}; {}, {} and {} say otherwise.",
+            "{} {}{every}. This was chosen automatically, since it predicts held-out parts of the run best. The error there is {} \
+             (below {} Hz, geometric mean over the drives){others}. Set it yourself with {}, {} and {}.",
             self.raw.file(),
             smoother.describe(),
             percent(Some(left.relative)),
@@ -220,7 +234,7 @@ impl SmootherSearch<'_> {
         Some((reading, RecordingNote::info(says)))
     }
 
-    /// Smoothers that are tried one after the other, the one that passes most first, until nothing is to be hoped for.
+    /// Tests smoothers in the order of decreasing bandwidth, until the residual is clearly too large.
     fn try_smoothers(
         &self,
         ladder: &[SmootherCandidate],
@@ -238,19 +252,21 @@ impl SmootherSearch<'_> {
                 break;
             }
         }
+        // Of all that are nearly as good, the last one smooths most.
         let is_good =
             |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + BETTER;
         let best = all.iter().rposition(is_good)?;
         Some(SmootherTrials { all, best })
     }
 
-    /// The factor of decimation, and what is left with it on held-out time.
+    /// The factor of decimation, with the residual on held-out parts; `None` if it cannot be evaluated.
     fn decimation(
         &self,
         smoother: SmootherCandidate,
         looked_at: &[TimeWindow],
     ) -> Option<(usize, HeldOutResidual)> {
         let mut best: Option<(usize, HeldOutResidual)> = None;
+        // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
             let passed = part * self.open.band_hz;
             let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
@@ -266,14 +282,15 @@ impl SmootherSearch<'_> {
         best
     }
 
-    /// The runs that a smoother gives.
+    /// The recording prepared with a smoother; `None` if that fails.
     fn runs(&self, smoother: SmootherCandidate) -> Option<Vec<PreparedRun>> {
         let mut preparation = self.reading.preparation.clone();
         smoother.apply_to(&mut preparation);
-        // Band and period were found already, and cost a look at all positions.
+        // Band and period are known already; finding them again would need all positions.
         preparation.band_hz = Some(self.open.band_hz);
         preparation.unexamined = true;
         let mut runs = free::runs(self.model, self.raw, &preparation).ok()?;
+        // Forces of a model with delay belong to earlier states.
         let delay = self.model.derivation.mechanism.force_delay;
         if delay != 0.0 {
             for run in &mut runs {
@@ -283,7 +300,7 @@ impl SmootherSearch<'_> {
         Some(runs)
     }
 
-    /// The stretches of time that all candidates have, or windows of them.
+    /// The intervals of time that all candidates have, or windows of them in a long recording.
     fn windows(&self, runs: &[PreparedRun]) -> Vec<TimeWindow> {
         let total: f64 = runs.iter().map(duration).sum();
         let step = self.evaluation_rate().recip();
@@ -307,18 +324,19 @@ impl SmootherSearch<'_> {
         windows
     }
 
-    /// The highest frequency that is looked at, Hz.
+    /// The highest frequency that is evaluated, Hz.
     fn highest_frequency(&self) -> f64 {
         let octaves = 2.0_f64.powi(i32::try_from(OCTAVES).unwrap_or(0));
         (octaves * self.open.band_hz).min(HIGHEST * self.open.rate_hz)
     }
 
-    /// Samples per second at which the model is evaluated.
+    /// Rate at which the model is evaluated, Hz.
     fn evaluation_rate(&self) -> f64 {
         (FINE * self.highest_frequency()).min(self.open.rate_hz)
     }
 
-    /// What is left on held-out time by a smoother, where rows below `passed`, Hz, are fitted.
+    /// The residual of a smoother on held-out parts, fitted to rows below `passed`, Hz; `None` if there are too few
+    /// samples.
     fn held_out_residual(
         &self,
         smoother: SmootherCandidate,
@@ -328,6 +346,7 @@ impl SmootherSearch<'_> {
         let runs = self.runs(smoother)?;
         let every = floor_to_count(self.open.rate_hz / self.evaluation_rate()).max(1);
         let rate = self.open.rate_hz / every as f64;
+        // Windows are found again in each run by their times, with one sample of tolerance.
         let slack = 1.0 / self.open.rate_hz;
         let samples = windows
             .iter()
@@ -340,6 +359,7 @@ impl SmootherSearch<'_> {
             })
             .collect::<Option<Vec<WindowSamples>>>()?;
         let total: usize = samples.iter().map(|one| one.forces.nrows()).sum();
+        // Stage 1: sums of each fold, and the parts of windows that belong to it.
         let mut before = 0;
         let mut folds: Vec<FoldSums> = Vec::new();
         let mut parts: Vec<(usize, usize, usize, usize)> = Vec::new();
@@ -352,6 +372,7 @@ impl SmootherSearch<'_> {
                 folds = vec![FoldSums::new(one.forces.ncols(), one.regressor.ncols()); FOLDS];
             }
             let fold_of = |i: usize| ((before + i) * FOLDS / total).min(FOLDS - 1);
+            // Filtered rows are correlated, so that only some of them are added.
             for i in (margin..n - margin).step_by(thin) {
                 folds[fold_of(i)].add(&filtered, i);
             }
@@ -364,8 +385,10 @@ impl SmootherSearch<'_> {
             }
             before += n;
         }
+        // Stage 2: each fold is predicted by values that were fitted to the others.
         let values = fit_folds(&folds)?;
         let drives = samples.first()?.forces.ncols();
+        // Octaves start at the band and are bounded by the rate of the evaluation.
         let edges: Vec<f64> = (0..=OCTAVES)
             .map(|k| self.open.band_hz * 2.0_f64.powi(i32::try_from(k).unwrap_or(0)))
             .filter(|edge| *edge < 0.45 * rate)
@@ -382,6 +405,7 @@ impl SmootherSearch<'_> {
                         (one.forces[(i, d)], products.sum::<f64>())
                     })
                     .unzip();
+                // Differences of successive low-passes are the octaves.
                 let mut below: [Option<Vec<f64>>; 2] = [None, None];
                 for (octave, edge) in octaves.iter_mut().zip(&edges) {
                     let passed = LowPass::butterworth(4, *edge, rate).and_then(|low_pass| {
@@ -390,7 +414,7 @@ impl SmootherSearch<'_> {
                             low_pass.zero_phase(&model)?,
                         ])
                     });
-                    // A part that is too short to be filtered is passed over.
+                    // A part that is too short to be filtered is skipped.
                     let Ok(passed) = passed else { continue };
                     let [y, m] = [0, 1].map(|k| match &below[k] {
                         Some(below) => passed[k].iter().zip(below).map(|(a, b)| a - b).collect(),
@@ -401,6 +425,7 @@ impl SmootherSearch<'_> {
                 }
             }
         }
+        // Stage 3: the figure over the drives.
         let mut figure = 0.0;
         let mut relative = 0.0;
         for octaves in &octaves {
@@ -424,7 +449,7 @@ impl SmootherSearch<'_> {
         })
     }
 
-    /// Regressor and forces at every so many samples of a window.
+    /// Regressor and forces at every `every`-th sample of a window; `None` if there are too few samples.
     fn samples(
         &self,
         run: &PreparedRun,
@@ -440,11 +465,11 @@ impl SmootherSearch<'_> {
         }
         let regressor = self.regressor(run, &samples)?;
         let mut picked = DMatrix::zeros(samples.len(), forces.len());
-        // What the filter feels beyond the window, with room to spare.
+        // The filter also depends on samples outside the window.
         let from = start.saturating_sub(BEYOND * every);
         for (d, force) in forces.iter().enumerate() {
             let around = &force[from..(end + BEYOND * every).min(force.len())];
-            // The noise of the forces must not fold down.
+            // A low-pass before thinning prevents aliasing of the force noise.
             let smooth = if every > 1 {
                 let rate = self.open.rate_hz;
                 let low_pass = LowPass::butterworth(4, 0.4 * rate / every as f64, rate).ok()?;
@@ -462,7 +487,8 @@ impl SmootherSearch<'_> {
         })
     }
 
-    /// The model's regressor at some samples, with friction and an offset of every drive beside; row of sample and drive.
+    /// The model's regressor at given samples, with friction and an offset of every drive added; one row per sample
+    /// and drive.
     fn regressor(&self, run: &PreparedRun, samples: &[usize]) -> Option<DMatrix<f64>> {
         let pick = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let pick = |column: &Vec<f64>| samples.iter().map(|k| column[*k]).collect();
@@ -482,6 +508,7 @@ impl SmootherSearch<'_> {
         let rates = evaluator.drive_motion(&states).ok()?;
         let rates = rates.get(n..2 * n)?;
         let width = regressor.ncols();
+        // Three more columns for each drive: rate, its sign, and a constant.
         let mut more = regressor.resize_horizontally(width + 3 * n, 0.0);
         for (d, rate) in rates.iter().enumerate() {
             for (i, rate) in rate.iter().enumerate() {
@@ -495,20 +522,24 @@ impl SmootherSearch<'_> {
     }
 }
 
-/// A stretch of time, s.
+/// An interval of time, s.
 struct TimeWindow {
+    /// First time.
     from: f64,
+    /// Last time.
     to: f64,
 }
 
-/// Rows of the regressor per sample and drive, and forces per sample.
+/// Rows of the regressor, one per sample and drive, and forces, one row per sample and one column per drive.
 struct WindowSamples {
+    /// Row `sample * n_drives + drive`, with the columns of friction and offset behind those of the model.
     regressor: DMatrix<f64>,
+    /// `[sample, drive]`.
     forces: DMatrix<f64>,
 }
 
 impl WindowSamples {
-    /// The same below a frequency, Hz; `None` where there are too few samples.
+    /// The same rows after a low-pass, Hz; `None` if there are too few samples. `rate` is that of the rows, Hz.
     fn low_passed(&self, passed: f64, rate: f64) -> Option<Self> {
         let mut filtered = Self {
             regressor: self.regressor.clone(),
@@ -537,15 +568,19 @@ impl WindowSamples {
     }
 }
 
-/// Inner products of measured and model force in an octave.
+/// Inner products of measured force and model force in one octave of one drive.
 #[derive(Clone, Default)]
 struct OctavePower {
+    /// Sum of squares of the measured force.
     measured: f64,
+    /// Inner product of both forces.
     product: f64,
+    /// Sum of squares of the model force.
     model: f64,
 }
 
 impl OctavePower {
+    /// Adds samples of both forces.
     fn add(&mut self, measured: &[f64], model: &[f64]) {
         for (y, m) in measured.iter().zip(model) {
             self.measured += y * y;
@@ -554,8 +589,8 @@ impl OctavePower {
         }
     }
 
-    /// What the model leaves of the measured force. It may be damped where it says less than it adds, as a filter will do
-    /// above the band of the motion: noise there costs nothing but what it hides.
+    /// Residual power of the measured force. Where the model overestimates an octave, its force may be damped, as a
+    /// filter does above the band of the motion: noise there costs only what it hides.
     fn residual_power(&self, may_be_damped: bool) -> f64 {
         let scale = if may_be_damped && self.model > 0.0 {
             (self.product / self.model).clamp(0.0, 1.0)
@@ -566,26 +601,32 @@ impl OctavePower {
     }
 }
 
-/// Samples at both ends of `n` that a low-pass at `band` spoils.
+/// Number of samples at both ends of `n` that a low-pass at `band`, Hz, distorts.
 fn margin(n: usize, rate: f64, band: f64) -> usize {
     floor_to_count((DROPPED.0 * rate / band).min(DROPPED.1 * n as f64))
 }
 
-/// Inner products of the rows of one fold, drive by drive.
+/// Sums over the rows of one fold, drive by drive.
 #[derive(Clone)]
 struct FoldSums {
     drives: Vec<DriveNormalEquations>,
 }
 
+/// Normal equations of one drive.
 #[derive(Clone)]
 struct DriveNormalEquations {
+    /// Gram matrix of the columns, lower triangle.
     normal: DMatrix<f64>,
+    /// Inner products of columns and force.
     right: DVector<f64>,
+    /// Sum of squares of the force.
     size: f64,
+    /// Number of rows.
     rows: usize,
 }
 
 impl FoldSums {
+    /// Sums without rows.
     fn new(drives: usize, width: usize) -> Self {
         let products = DriveNormalEquations {
             normal: DMatrix::zeros(width, width),
@@ -598,6 +639,7 @@ impl FoldSums {
         }
     }
 
+    /// Adds the rows of all drives at a sample.
     fn add(&mut self, samples: &WindowSamples, i: usize) {
         let drives = self.drives.len();
         for (d, one) in self.drives.iter_mut().enumerate() {
@@ -611,7 +653,7 @@ impl FoldSums {
     }
 }
 
-/// For each fold the values that fit the others; `None` where there are too few rows, or nothing is measured.
+/// For each fold the values that fit the others; `None` if there are too few rows, or a force is zero.
 fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     let n = folds.first()?.drives.len();
     let width = folds[0].drives[0].right.len();
@@ -621,7 +663,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     if rows * n < 3 * width || sizes.iter().any(|size| *size <= 0.0) {
         return None;
     }
-    // Drives count alike at first, then by what is left of them.
+    // All drives have equal relative weights first, then weights from their residuals.
     let mut left = sizes.clone();
     let mut values = Vec::new();
     for _ in 0..2 {
@@ -630,6 +672,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
             .collect();
         left = vec![0.0; n];
         values.clear();
+        // All folds except the one that is held out.
         for (out, judged) in folds.iter().enumerate() {
             let mut normal = DMatrix::zeros(width, width);
             let mut right = DVector::zeros(width);
@@ -640,6 +683,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
                 }
             }
             let found = solve_scaled(&normal, &right)?;
+            // The sum of squares of the residual follows from the sums of the fold.
             for (left, one) in left.iter_mut().zip(&judged.drives) {
                 let explained =
                     2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
@@ -651,7 +695,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     Some(values)
 }
 
-/// Values of scaled normal equations with a trace of a ridge, since columns may be the same.
+/// Solves scaled normal equations with a small ridge, since columns may be equal.
 fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let mut normal = symmetric(normal);
     let n = right.len();
@@ -670,13 +714,14 @@ fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f
     Some(normal.cholesky()?.solve(&scaled).component_mul(&scale))
 }
 
-/// The whole of a matrix of which the lower triangle is there.
+/// The symmetric matrix of a lower triangle.
 fn symmetric(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let mut whole = lower.clone();
     whole.fill_upper_triangle_with_lower_triangle();
     whole
 }
 
+/// Duration of a run, s.
 fn duration(run: &PreparedRun) -> f64 {
     match run.time.as_slice() {
         [first, .., last] => last - first,

@@ -1,23 +1,25 @@
-//! Where a mechanism itself makes forces peak: its drives lose their leverage near singular poses.
+//! Force peaks that the mechanism itself causes: near singular poses its drives have little leverage.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::SignalRecording as Raw;
 
 use crate::model::Model;
 
-/// Samples to either side that a pose is held against.
+/// Number of samples to either side with which a pose is compared.
 const BESIDE: usize = 10;
-/// A drive has lost its leverage where it needs so many times the force that it needs beside.
+/// A peak is assumed where a drive needs this many times the force that it needs at the samples around.
 const PEAK: f64 = 3.0;
 
-/// The drives of a mechanism with loops along the positions of a recording, before anything is prepared.
+/// The drives of a mechanism with loops along the positions of a recording, before preparation.
 pub(super) struct DriveLeverage<'a> {
+    /// The model, whose regressor gives the demand.
     model: &'a Model,
-    /// Positions, `[coordinate][sample]`; none for open chains and where a column is missing.
+    /// Positions, `[coordinate][sample]`; `None` for open chains and if a column is missing.
     q: Option<Vec<Vec<f64>>>,
 }
 
 impl<'a> DriveLeverage<'a> {
+    /// Reads the positions of a mechanism with loops.
     pub(super) fn new(model: &'a Model, raw: &Raw) -> Self {
         let columns = || -> Option<Vec<Vec<f64>>> {
             let of = |name: String| raw.column(&name).ok().map(<[f64]>::to_vec);
@@ -30,23 +32,24 @@ impl<'a> DriveLeverage<'a> {
         }
     }
 
-    /// Whether a drive needs far more force at a sample than around it to accelerate all coordinates alike.
+    /// Whether a drive needs far more force at a sample than around it for equal accelerations of all coordinates.
     pub(super) fn is_peak(&self, drive: usize, sample: usize) -> bool {
         let Some(samples) = self.q.as_ref().and_then(|q| q.first()).map(Vec::len) else {
             return false;
         };
         let from = sample.saturating_sub(BESIDE);
         let until = (sample + BESIDE + 1).min(samples);
-        // A pose without an answer is singular.
+        // A pose without a solution is singular.
         let Some(here) = self.force_demand(drive, sample) else {
             return true;
         };
+        // The comparison uses the two ends of the range around the sample.
         let around = [from, until - 1].map(|i| self.force_demand(drive, i));
         let least = around.into_iter().flatten().fold(f64::INFINITY, f64::min);
         here > PEAK * least
     }
 
-    /// The length of a drive's row of H where all coordinates accelerate by one from rest.
+    /// The norm of a drive's row of H if all coordinates accelerate by one from standstill; `None` at singular poses.
     fn force_demand(&self, drive: usize, sample: usize) -> Option<f64> {
         let q: Vec<[f64; 1]> = self.q.iter().flatten().map(|q| [q[sample]]).collect();
         let (still, one) = (vec![[0.0]; q.len()], vec![[1.0]; q.len()]);
@@ -65,7 +68,7 @@ impl<'a> DriveLeverage<'a> {
     }
 }
 
-/// One number of each column.
+/// One value of each column, as slices.
 fn slices(columns: &[[f64; 1]]) -> Vec<&[f64]> {
     columns.iter().map(<[f64; 1]>::as_slice).collect()
 }

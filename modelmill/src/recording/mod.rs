@@ -1,5 +1,5 @@
-//! Recordings of a model: read with the names that the model and the user give, prepared, and looked at before anything is
-//! believed.
+//! Recordings for a model: read with the names of the model file and the user, prepared, and checked before any
+//! result is computed.
 
 mod choice;
 mod columns;
@@ -33,9 +33,12 @@ pub use modelmill_identify::{DerivativeSource, MAX_FILTER_ORDER, has_recording_e
 pub use modelmill_identify::{PreparedRun, SmoothingMethod, StatePreparation};
 pub use options::RecordingOptions;
 
-/// Reads a recording with the columns that a model needs.
+/// Reads a recording with the columns that a model needs, completes free bodies and repairs faults of sensors.
+///
+/// Fails when the file cannot be read or lacks columns.
 fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) -> Outcome<Raw> {
     let name = file.name();
+    // Names of the file are needed to resolve the mapping.
     let options = read_options(model, reading, &file.names()?, name)?;
     let mut raw = model
         .host()
@@ -43,6 +46,7 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
     for note in free::complete(model, &mut raw)? {
         model.host().note(&note);
     }
+    // Force peaks near singular poses are no outliers.
     let leverage = DriveLeverage::new(model, &raw);
     raw.repair(
         &model.active_coordinates(),
@@ -53,13 +57,14 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
     Ok(raw)
 }
 
-/// The stretches of a recording; where the model says that forces are read late, each force has the states of the moment at
-/// which it acted.
+/// The prepared segments of a recording. If the model has a delay of the force signal, each force gets the states of
+/// the time at which it acted.
 fn prepare_segments(
     model: &Model,
     raw: &Raw,
     reading: &RecordingOptions,
 ) -> Outcome<Vec<RecordingSegment>> {
+    // The delay is a property of the model, not of the file.
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
     note_idle_options(&mut data, reading);
@@ -69,7 +74,7 @@ fn prepare_segments(
     Ok(data)
 }
 
-/// The stretches of a recording with states and forces as it has them side by side.
+/// The prepared segments of a recording, without compensation of a delay.
 pub(crate) fn read_as_recorded(
     model: &Model,
     path: &Path,
@@ -79,7 +84,7 @@ pub(crate) fn read_as_recorded(
     let raw = read_raw(model, &file, reading)?;
     let (mut reading, note) = resolve_reading(model, &raw, reading)?;
     if reading.preparation.chosen {
-        // Rows of a fit are of no interest here.
+        // Decimation was chosen for fits; forces are wanted at every sample.
         reading.preparation.decimate = 1;
     }
     let reading = &reading;
@@ -94,7 +99,7 @@ pub(crate) fn read_as_recorded(
     Ok(data)
 }
 
-/// The reading with what it leaves open of the preparation chosen, and what was chosen.
+/// The reading options with all open choices of the preparation made, and a note on the choice.
 fn resolve_reading(
     model: &Model,
     raw: &Raw,
@@ -110,7 +115,7 @@ fn resolve_reading(
     })
 }
 
-/// Gives every force the states of the moment at which it acted, by the model's delay.
+/// Assigns to every force the states at the time at which it acted, by the model's delay, s.
 fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
     if delay == 0.0 {
         return Ok(());
@@ -118,12 +123,13 @@ fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
     let ms = 1e3 * delay;
     let Some((start, end)) = run.shift_states_by_delay(delay) else {
         return Err(Error::input(format!(
-            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states to go with; check T, \
+            "{}: the model's `time_delay` of {ms} ms leaves fewer than four of {} samples with states; check T, \
              which is in seconds",
             run.file,
             run.time.len()
         )));
     };
+    // A delay loses samples at the start, a lead at the end.
     let (side, lost) = if start > 0 {
         ("first", start)
     } else {
@@ -131,16 +137,18 @@ fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
     };
     let lost = match lost {
         0 => String::new(),
-        1 => format!("; the {side} sample has no states to go with and is left out"),
-        n => format!("; the {side} {n} samples have no states to go with and are left out"),
+        1 => format!("; the {side} sample has no states and is left out"),
+        n => format!("; the {side} {n} samples have no states and are left out"),
     };
     run.notes.push(RecordingNote::info(format!(
-        "Forces of {} are held against the states of {ms} ms before, as the model's `time_delay` says{lost}.",
+        "Forces of {} are compared with the states {ms} ms before, by the model's `time_delay`{lost}.",
         run.file
     )));
     Ok(())
 }
 
+/// Prepares all segments of a recording: states, notes on suspicious signals, delay, variances and
+/// disturbances.
 fn prepare(
     model: &Model,
     recording: &Raw,
@@ -148,6 +156,7 @@ fn prepare(
     delay: f64,
 ) -> Outcome<Vec<RecordingSegment>> {
     let preparation = &args.preparation;
+    // States are prepared for each segment between gaps.
     let mut runs =
         model
             .host()
@@ -155,9 +164,10 @@ fn prepare(
                 free::runs(model, recording, preparation)
             })??;
     let is_examined = !preparation.unexamined;
+    // Notes on the recording are added to its first segment.
     if let Some(first) = runs.first_mut().filter(|_| is_examined) {
         let mut motions = model.motions();
-        // Twists are no derivatives of the coordinates whose names they have.
+        // Rates of free bodies are twists, no derivatives of the coordinates with their names.
         let free: Vec<&str> = free::free_bodies(&model.derivation.mechanism)
             .flat_map(|body| body.position.iter().chain(&body.quaternion))
             .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
@@ -168,6 +178,7 @@ fn prepare(
         let oddities = recording.signal_notes(&model.motions(), &model.drives());
         first.notes.splice(0..0, oddities);
     }
+    // Remedies for angles in degrees are kept, in case the audit finds such angles.
     let motions = model.motions();
     let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
     let maps_from_degrees: Vec<OptionSetting> = angles
@@ -180,6 +191,7 @@ fn prepare(
         }
         compensate_delay(run, delay)?;
     }
+    // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
         (recording
             .position_faults(&model.active_coordinates())
@@ -203,8 +215,9 @@ fn prepare(
     with_variance.collect()
 }
 
-/// A fault of positions as a diagnosis tells it.
+/// A fault of the positions as a disturbance for the diagnosis.
 fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturbance {
+    // Both faults have one number with a unit.
     let (kind, at, name, value, unit, says) = match fault {
         PositionFault::Jitter { time } => (
             "time_jitter",
@@ -213,8 +226,8 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
             *time,
             "s",
             format!(
-                "the time stamps of {file} jitter: positions err in proportion to the rate, all coordinates by the same time, \
-                 {} ms in the mean square",
+                "the time stamps of {file} jitter: the position error is proportional to the rate, with the same time error for all coordinates, \
+                 {} ms rms",
                 significant(1e3 * time, 2)
             ),
         ),
@@ -232,7 +245,7 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
                 *width,
                 unit,
                 format!(
-                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps to and fro by {} {unit}",
+                    "backlash between the encoder of {coordinate} and its load: in {file} the reading jumps back and forth by {} {unit}",
                     significant(*width, 2)
                 ),
             )
@@ -248,9 +261,10 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
     }
 }
 
-/// Says that options of the filter do nothing where all derivatives are recorded.
+/// Warns about filter options that have no effect because all derivatives are recorded.
 fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     let usual = StatePreparation::default();
+    // Only options that the user changed are named.
     let given: Vec<Message> = [
         args.preparation.cutoff_hz.map(|_| OptionName::CutoffHz),
         (args.preparation.order != usual.order).then_some(OptionName::Order),
@@ -265,7 +279,7 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     if let Some(one) = data.first_mut() {
         let does = if given.len() == 1 { "does" } else { "do" };
         one.run.notes.push(RecordingNote::warning(message!(
-            "{} {does} nothing to {}: it holds all rates and accelerations, so none are made from positions; ask for \
+            "{} {does} nothing to {}: it has all rates and accelerations, so none are computed from positions; request \
              that with {}.",
             Message::join(given, " and "),
             one.run.file,
@@ -274,17 +288,19 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     }
 }
 
-/// Warns of recordings that are given twice, also as copies: they count twice, or make a check that proves nothing.
+/// Warns about recordings that are given twice, also as copies: they have double weight, or make a validation run
+/// useless.
 pub fn note_duplicates(
     model: &Model,
     data: &mut [RecordingSegment],
     check: &mut [RecordingSegment],
 ) {
+    // A recording is compared with all earlier ones.
     for k in 1..data.len() {
         let (before, rest) = data.split_at_mut(k);
         if let Some(twin) = before.iter().find(|other| other.has_same_samples(&rest[0])) {
             let says = format!(
-                "{} and {} are the same recording: it counts twice, and deviations come out too small; give it once.",
+                "{} and {} are the same recording: it has double weight, and standard deviations become too small; give it once.",
                 twin.run.file, rest[0].run.file
             );
             rest[0].note(model, RecordingNote::warning(says));
@@ -293,8 +309,8 @@ pub fn note_duplicates(
     for one in check {
         if let Some(twin) = data.iter().find(|other| other.has_same_samples(one)) {
             let says = format!(
-                "{} is used for the fit and {} for the check, but they are the same recording: such a check proves \
-                 nothing; check on another motion.",
+                "{} is used for the fit and {} for validation, but they are the same recording: such a validation proves nothing; \
+                 validate with another motion.",
                 twin.run.file, one.run.file
             );
             one.note(model, RecordingNote::warning(says));
@@ -302,20 +318,39 @@ pub fn note_duplicates(
     }
 }
 
-/// A recording of a model: as it was read, and its stretches between gaps in time, prepared for the model.
+/// A recording for a model: its raw content, and its segments without gaps in time, prepared for the model.
 #[derive(Clone)]
 pub struct PreparedRecording {
-    /// One stretch or, where the recording is cut at gaps in time, several.
+    /// One segment, or several if the recording has gaps in time.
     pub segments: Vec<RecordingSegment>,
+    /// The recording before preparation.
     raw: Arc<Raw>,
+    /// The options with which it was prepared, including automatic choices.
     reading: RecordingOptions,
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), prepares its states, and looks at it before anything is believed:
-    /// what was done and what looks odd stands in the notes of its stretches.
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), prepares its states, and checks it. The notes
+    /// of its segments state what was done and what looks suspicious.
     ///
-    /// Fails with place and remedy when a column is missing or holds no number, or time stands still.
+    /// Fails with place and remedy when a column is missing or contains no numbers, or when time does not increase.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// // The recording calls the first joint `pos1`, in degrees.
+    /// let options = RecordingOptions {
+    ///     columns: vec![("q1".to_owned(), "pos1 [deg]".to_owned())],
+    ///     ..RecordingOptions::default()
+    /// };
+    /// let run = model.recording("run.csv", &options)?;
+    /// for note in run.notes() {
+    ///     println!("{}", note.says.in_library_words());
+    /// }
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn recording(
         &self,
         path: impl AsRef<Path>,
@@ -324,8 +359,8 @@ impl Model {
         self.recording_of(&[path.as_ref()], reading)
     }
 
-    /// As [`Model::recording`], of several files of one run, whose columns are joined on time: the slowest gives the
-    /// samples, and the others are interpolated.
+    /// As [`Model::recording`], for several files of one run, whose columns are joined on time: the slowest file sets
+    /// the sample times, and the others are interpolated to them.
     pub fn recording_of(
         &self,
         paths: &[&Path],
@@ -335,6 +370,7 @@ impl Model {
         let read = opened
             .map_err(Error::from)
             .and_then(|file| read_raw(self, &file, reading));
+        // A file of another kind, such as a model file, gets a message that names the kind.
         let raw = read.map_err(|failure| {
             let kinds = paths.iter().map(|path| (path, kinds_of_files::file_kind(self.host(), path)));
             let mut others = kinds.filter_map(|(path, kind)| Some((path.display(), kind?)));
@@ -348,8 +384,8 @@ impl Model {
         PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], of columns that are in memory, such as those of a data frame, with their names; NaN stands
-    /// for what is missing. `name` is what messages call them.
+    /// As [`Model::recording`], for columns in memory with their names, such as those of a data frame. NaN marks
+    /// missing values. `name` is the name of the table in messages.
     ///
     /// Fails as [`Model::recording`] does, and when columns differ in length.
     pub fn recording_of_table(
@@ -362,8 +398,8 @@ impl Model {
         PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], of a file that is in memory, such as an object of a store. `name` is what messages call it, and its
-    /// ending says what it is.
+    /// As [`Model::recording`], for a file in memory, such as an object of a store. `name` is its name in messages,
+    /// and its extension determines the format.
     ///
     /// Fails as [`Model::recording`] does.
     pub fn recording_of_bytes(
@@ -380,6 +416,7 @@ impl Model {
 }
 
 impl PreparedRecording {
+    /// Prepares a raw recording; unless it is `unexamined`, open choices are made and the audit runs.
     fn new(model: &Model, raw: Raw, reading: &RecordingOptions) -> Outcome<Self> {
         let raw = Arc::new(raw);
         if reading.preparation.unexamined {
@@ -402,7 +439,7 @@ impl PreparedRecording {
         })
     }
 
-    /// The same recording with other stretches.
+    /// The same recording with other segments.
     pub(crate) fn with_segments(&self, stretches: Vec<RecordingSegment>) -> Self {
         Self {
             segments: stretches,
@@ -411,28 +448,29 @@ impl PreparedRecording {
         }
     }
 
-    /// What messages call its file.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         self.raw.file()
     }
 
-    /// The readings of a column by our name, one for each sample, as they were before anything was filtered; `None` where there
-    /// is none that holds numbers alone.
+    /// The values of a column by its name in the model, one for each sample, before any filter; `None` if there is no
+    /// such column of finite numbers.
     pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
         self.raw.column(name).ok()
     }
 
-    /// Remarks on all stretches.
+    /// Notes on all segments.
     pub fn notes(&self) -> impl Iterator<Item = &RecordingNote> {
         self.segments.iter().flat_map(RecordingSegment::notes)
     }
 
-    /// The stretches with the faults of its sensors left in; `None` where none were taken out, or they cannot be prepared then.
+    /// The segments without repair of sensor faults; `None` if nothing was repaired, or they cannot be prepared
+    /// without.
     pub(crate) fn with_faults(&self, model: &Model) -> Option<Vec<RecordingSegment>> {
         let faulty = self.raw.restore_sensor_faults()?;
         let delay = model.derivation.mechanism.force_delay;
         let mut stretches = prepare(model, &faulty, &self.reading, delay).ok()?;
-        // What else was left out of them stays so.
+        // Weights of other exclusions are kept.
         for (faulty, sound) in stretches.iter_mut().zip(&self.segments) {
             if faulty.samples() == sound.samples() {
                 faulty.weights.clone_from(&sound.weights);
@@ -441,13 +479,14 @@ impl PreparedRecording {
         Some(stretches)
     }
 
-    /// The stretches prepared once more, for another model of the same machine, whose forces may act later.
+    /// The segments prepared again for another model of the same machine, which may have another delay of the force
+    /// signal.
     pub(crate) fn prepare_for(&self, model: &Model) -> Outcome<Vec<RecordingSegment>> {
         prepare_segments(model, &self.raw, &self.reading)
     }
 }
 
-/// The stretches of recordings for fit and check, with remarks on those that are given twice.
+/// The segments of recordings for fit and validation, with notes on recordings that are given twice.
 pub(crate) fn segments(
     model: &Model,
     fit: &[&PreparedRecording],

@@ -1,24 +1,25 @@
-//! Ways to smooth positions that are tried against each other: low-passes, and Fourier series where a motion repeats itself.
+//! Candidates for the smoothing of positions: low-pass filters, and Fourier series if a motion is periodic.
 
 use modelmill_identify::{SmoothingMethod, StatePreparation};
 
 use crate::text::table::significant;
 
-/// Ratio of neighbouring numbers of harmonics.
+/// Ratio of successive numbers of harmonics.
 const FEWER: f64 = 1.35;
-/// Harmonics of a series, at most.
+/// Largest number of harmonics of a series.
 const MOST_HARMONICS: usize = 100;
 
-/// A way to smooth positions.
+/// A candidate for the smoothing of positions.
 #[derive(Clone, Copy)]
 pub(super) struct SmootherCandidate {
-    /// Hz.
+    /// Cut-off frequency of the low-pass, or highest frequency of the series, Hz.
     pub(super) cutoff: f64,
-    /// The period of a Fourier series, s; none of a low-pass.
+    /// The period of a Fourier series, s; `None` for a low-pass.
     period: Option<f64>,
 }
 
 impl SmootherCandidate {
+    /// A low-pass with a cut-off frequency, Hz.
     pub(super) fn low_pass(cutoff: f64) -> Self {
         Self {
             cutoff,
@@ -26,18 +27,21 @@ impl SmootherCandidate {
         }
     }
 
+    /// A Fourier series with a period, s, and a number of harmonics.
     pub(super) fn series(period: f64, harmonics: usize) -> Self {
         Self {
-            // Rounding must not take the last one.
+            // The margin keeps the last harmonic when the number is rounded down.
             cutoff: (harmonics as f64 + 1e-6) / period,
             period: Some(period),
         }
     }
 
+    /// Number of harmonics; `None` for a low-pass.
     pub(super) fn harmonics(self) -> Option<usize> {
         Some(floor_to_count(self.cutoff * self.period?))
     }
 
+    /// Sets the candidate in the options of a preparation.
     pub(super) fn apply_to(self, preparation: &mut StatePreparation) {
         preparation.cutoff_hz = Some(self.cutoff);
         if self.period.is_some() {
@@ -47,7 +51,7 @@ impl SmootherCandidate {
         }
     }
 
-    /// Where it is, beside others of its kind.
+    /// The cut-off or the number of harmonics as text.
     pub(super) fn frequency_text(self) -> String {
         match self.harmonics() {
             Some(1) => "1 harmonic".to_owned(),
@@ -56,19 +60,20 @@ impl SmootherCandidate {
         }
     }
 
+    /// The candidate as a predicate about a recording.
     pub(super) fn describe(self) -> String {
         match self.period {
             Some(period) => format!(
-                "is taken for a Fourier series of period {} s with {}",
+                "is fitted by a Fourier series of period {} s with {}",
                 significant(period, 5),
                 self.frequency_text()
             ),
-            None => format!("is smoothed at {}", self.frequency_text()),
+            None => format!("is smoothed by a low-pass at {}", self.frequency_text()),
         }
     }
 }
 
-/// Series up to a frequency, Hz, of ever fewer harmonics.
+/// Fourier series up to a frequency, Hz, with decreasing numbers of harmonics.
 pub(super) fn series_up_to(highest: f64, period: f64) -> Vec<SmootherCandidate> {
     let mut harmonics = floor_to_count(highest * period).clamp(1, MOST_HARMONICS);
     let mut ladder = Vec::new();

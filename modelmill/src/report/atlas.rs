@@ -14,17 +14,18 @@ use crate::text::table::significant;
 
 /// A mechanism of the page: its counts in the atlas, its model, and its picture as SVG.
 pub struct AtlasMechanism {
-    /// Counts.
+    /// Counts of the mechanism.
     pub entry: AtlasEntry,
     /// The model.
     pub model: Model,
-    /// SVG that can stand in a page.
+    /// The picture as SVG for a page.
     pub picture: String,
 }
 
-/// The page's text.
+/// The page as HTML.
 pub fn atlas(mechanisms: &[AtlasMechanism]) -> String {
     let mut page = pages::begin("Atlas of mechanisms");
+    // The explanation comes first, then the table, then one section for each mechanism.
     for paragraph in ABOUT {
         let _ = writeln!(page, "<p>{}</p>", emphasis_html(paragraph));
     }
@@ -39,6 +40,7 @@ pub fn atlas(mechanisms: &[AtlasMechanism]) -> String {
 /// HTML of a text in which `*x*` is emphasised and `` `x` `` is code.
 fn emphasis_html(text: &str) -> String {
     let mut html = String::new();
+    // Code is replaced after emphasis, in the result of the first pass.
     for (mark, tag) in [('*', "em"), ('`', "code")] {
         let source = if html.is_empty() {
             escape(text)
@@ -55,13 +57,16 @@ fn emphasis_html(text: &str) -> String {
     html
 }
 
-/// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds of the derivation.
+/// The table of all mechanisms: numbers of joints, loops, drives and base parameters, operations, and seconds
+/// of the derivation.
 fn counts(mechanisms: &[AtlasMechanism]) -> String {
+    // Numbers are sorted by value.
     let whole = |n: usize| TableCell::number(&n.to_string(), n as f64);
     let rows: Vec<Vec<TableCell>> = mechanisms
         .iter()
         .map(|AtlasMechanism { entry, .. }| {
             let name = escape(&entry.name);
+            // Additions and multiplications are added up, so that columns can be sorted.
             let operations = |k: usize| entry.operations[k].add + entry.operations[k].mul;
             vec![
                 TableCell::html(format!("<a href=\"#{name}\">{name}</a>")),
@@ -105,6 +110,7 @@ fn counts(mechanisms: &[AtlasMechanism]) -> String {
 /// The section of one mechanism: title, picture and base parameters.
 fn mechanism(one: &AtlasMechanism) -> String {
     let AtlasMechanism { entry, picture, .. } = one;
+    // Imported mechanisms have no table of expressions.
     let expressions = if entry.is_imported {
         String::new()
     } else {

@@ -1,4 +1,5 @@
-//! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the script that zooms.
+//! Measured and calculated forces over time: pictures that need no script, and the same numbers packed for the
+//! script that zooms.
 //!
 //! Long recordings keep the least and the largest value of each of many segments, so that no peak is lost and the page
 //! stays small; values are packed as 16-bit steps between the least and the largest of a curve.
@@ -16,13 +17,13 @@ use super::units::force_unit;
 use crate::diagnose::{ForceComparison, ModelVersion};
 use crate::text::svg::{escape, thin_out};
 
-/// Values that all curves of a page may have together.
+/// Largest number of values of all curves of a page.
 const BUDGET: usize = 420_000;
-/// Values that a curve has at least, if it has as many.
+/// Smallest number of values of a curve, if the recording has as many.
 const LEAST: usize = 1200;
-/// Points of a curve in the picture that stands by itself.
+/// Largest number of points of a curve in the picture without script.
 const STILL: usize = 600;
-/// Recordings of which curves are shown.
+/// Largest number of recordings whose curves are shown.
 pub(crate) const MOST_RUNS: usize = 6;
 /// Height of a panel.
 const HEIGHT: f64 = 190.0;
@@ -39,9 +40,10 @@ struct PlotCurve {
     values: Vec<f64>,
 }
 
-/// Measured and calculated forces over time and their errors for each recording, validation runs first. `names` are the names of
-/// the curves before and after. The same numbers follow as JSON for the script of pages.
+/// Measured and calculated forces over time and their errors for each recording, validation runs first. `names`
+/// are the names of the curves before and after. The same numbers follow as JSON for the script of pages.
 pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2]) -> String {
+    // Validation runs come first, since they decide.
     let mut order: Vec<usize> = (0..before.runs.len()).collect();
     order.sort_by_key(|k| !before.runs[*k].is_check);
     let shown = order.len().min(MOST_RUNS);
@@ -51,6 +53,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
     let most = (BUDGET / curves.max(1)).max(LEAST);
     let mut html = String::new();
     for (place, k) in order[..shown].iter().enumerate() {
+        // Each recording is folded, with the first one open.
         let run = &before.runs[*k];
         let title = format!(
             "{} {}",
@@ -70,6 +73,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
         html.push_str(&run_panels(before, after, names, *k, most));
         html.push_str("</details>\n");
     }
+    // Recordings without curves are counted.
     if shown < order.len() {
         let _ = writeln!(
             html,
@@ -92,6 +96,7 @@ fn run_panels(
     let mut packed = Vec::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
         let unit = force_unit(&before.model, d);
+        // Two panels for each drive: forces, and their errors.
         for (title, curves) in panels(before, after, names, k, d, drive) {
             let title = format!("{title}, {unit}");
             html.push_str(&static_picture(&title, &curves));
@@ -129,6 +134,7 @@ fn panels(
     };
     // "model as it is" has an "error as it is".
     let error = |name: &str| format!("error {}", name.trim_start_matches("model "));
+    // The measured force, the model as it is, and the model with effects.
     let run = &before.runs[k];
     let mut forces = vec![
         curve("measured", "c-measured", run, run.measured[d].clone()),
@@ -148,6 +154,7 @@ fn panels(
 
 /// The picture without any script.
 fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
+    // Both axes cover all curves of the panel.
     let spans: Vec<f64> = curves.iter().flat_map(|c| c.span).collect();
     let time = range(&spans);
     let values = with_room(range(curves.iter().flat_map(|c| &c.values)), 0.05);
@@ -161,6 +168,7 @@ fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
             &line(&curve.values, &x, curve.span, &y, STILL),
         );
     }
+    // The names of the curves are their key, with the class that gives the colour.
     let names: Vec<String> = curves
         .iter()
         .map(|c| {
@@ -183,8 +191,10 @@ fn static_picture(title: &str, curves: &[PlotCurve]) -> String {
 /// A curve for the script: the number that a step stands for, and the steps.
 fn pack(curve: &PlotCurve, most: usize) -> serde_json::Value {
     let values = &curve.values;
+    // Extremes of each segment are kept.
     let kept: Vec<f64> = thin_out(values, most).into_iter().map(|(_, v)| v).collect();
     let [low, high] = range(&kept);
+    // A constant curve has a step of zero.
     let (low, step) = if high > low {
         (low, (high - low) / 65_534.0)
     } else {
@@ -197,6 +207,7 @@ fn pack(curve: &PlotCurve, most: usize) -> serde_json::Value {
             clippy::cast_sign_loss,
             reason = "between 0 and 65534"
         )]
+        // The largest number marks values that are not finite.
         let steps = if !value.is_finite() {
             u16::MAX
         } else if step > 0.0 {
@@ -222,6 +233,7 @@ fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
+        // Three bytes are four letters; missing bytes at the end are padded.
         let byte = |i: usize| u32::from(three.get(i).copied().unwrap_or(0));
         let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
         for i in 0..4 {

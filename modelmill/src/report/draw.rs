@@ -1,4 +1,5 @@
-//! Drawing by hand: axes with round ticks, panels, and paths of SVG. Colours are classes, so that a page may be light or dark.
+//! Drawing of pictures as SVG: axes with round ticks, panels, and paths. Colours are classes of the style, so that
+//! a page may be light or dark.
 
 use std::fmt::Write as _;
 
@@ -27,7 +28,7 @@ pub(crate) struct PlotAxis {
 }
 
 impl PlotAxis {
-    /// An axis; one that has no length gets some.
+    /// A linear axis; a range without length is widened.
     pub(crate) fn new(range: [f64; 2], pixels: [f64; 2]) -> Self {
         let [mut from, mut to] = range;
         if !(from.is_finite() && to.is_finite()) {
@@ -47,7 +48,7 @@ impl PlotAxis {
         }
     }
 
-    /// An axis of decades; values must be positive.
+    /// A logarithmic axis; values must be positive.
     pub(crate) fn decades(range: [f64; 2], pixels: [f64; 2]) -> Self {
         // Zero has no logarithm, and a range below a factor of 1.5 has too few ticks.
         let from = range[0].max(1e-300);
@@ -58,8 +59,9 @@ impl PlotAxis {
         }
     }
 
-    /// Where a value lies, kept within the axis.
+    /// The position of a value, kept within the axis.
     pub(crate) fn position(&self, value: f64) -> f64 {
+        // The share of the axis between its ends.
         let share = if self.log {
             (value.max(1e-300) / self.from).ln() / (self.to / self.from).ln()
         } else {
@@ -84,6 +86,7 @@ impl PlotAxis {
                 step = round_step(0.4 * step);
             }
         }
+        // The first multiple of the step within the axis.
         let first = (self.from / step - 1e-9).ceil();
         let mut ticks = Vec::new();
         for k in 0..=2 * most.max(1) {
@@ -129,16 +132,17 @@ impl PlotAxis {
     }
 }
 
-/// The next of 1, 2 or 5 times a power of ten that is not below a number.
+/// The smallest of 1, 2 or 5 times a power of ten that is not below a number.
 fn round_step(rough: f64) -> f64 {
     let rough = rough.max(f64::MIN_POSITIVE * 1e10);
     let decade = 10_f64.powf(rough.log10().floor());
+    // Readers can interpolate between these steps.
     let steps = [1.0, 2.0, 5.0, 10.0];
     let step = steps.into_iter().find(|s| s * decade >= rough * 0.999);
     step.unwrap_or(10.0) * decade
 }
 
-/// A tick's label with as many digits as steps need.
+/// The label of a tick, with as many digits as steps need.
 fn label(value: f64, step: f64) -> String {
     // A sum of steps may miss zero by rounding.
     if value.abs() < 1e-9 * step.abs() {
@@ -158,16 +162,18 @@ fn label(value: f64, step: f64) -> String {
     format!("{value:.decimals$}").replace('-', "−")
 }
 
-/// A picture as it grows.
+/// A picture under construction.
 pub(crate) struct SvgPicture {
     /// SVG elements so far.
     body: String,
+    /// Width of the picture, in its own units.
     width: f64,
+    /// Height of the picture.
     height: f64,
 }
 
 impl SvgPicture {
-    /// An empty one.
+    /// An empty picture.
     pub(crate) fn new(width: f64, height: f64) -> Self {
         Self {
             body: String::new(),
@@ -176,10 +182,12 @@ impl SvgPicture {
         }
     }
 
-    /// Grid, ticks and a frame around a pair of axes; `x` may be without labels.
+    /// Draws grid, ticks and a frame for a pair of axes. `n_ticks` are the numbers of ticks of both; `title` is
+    /// that of the axis across.
     pub(crate) fn frame(&mut self, x: &PlotAxis, y: &PlotAxis, title: &str, n_ticks: [usize; 2]) {
         let (left, right) = (x.start, x.end);
         let (bottom, top) = (y.start, y.end);
+        // Lines and labels of the axis across.
         for (value, label) in x.ticks(n_ticks[0]) {
             let at = x.position(value);
             let _ = write!(
@@ -188,6 +196,7 @@ impl SvgPicture {
                 bottom + 15.0
             );
         }
+        // Lines and labels of the axis upwards.
         for (value, label) in y.ticks(n_ticks[1]) {
             let at = y.position(value);
             let _ = write!(
@@ -211,12 +220,12 @@ impl SvgPicture {
         }
     }
 
-    /// A path with a class.
+    /// Adds a path with a class of the style.
     pub(crate) fn path(&mut self, class: &str, d: &str) {
         let _ = write!(self.body, r#"<path class="{class}" d="{d}"/>"#);
     }
 
-    /// Text at a place; `anchor` as SVG has it.
+    /// Adds a text at a place; `anchor` is `start`, `middle` or `end`.
     pub(crate) fn text(&mut self, class: &str, at: [f64; 2], anchor: &str, text: &str) {
         let _ = write!(
             self.body,
@@ -227,7 +236,7 @@ impl SvgPicture {
         );
     }
 
-    /// A rectangle from one corner to the opposite one.
+    /// Adds a rectangle between two opposite corners.
     pub(crate) fn rect(&mut self, class: &str, a: [f64; 2], b: [f64; 2]) {
         let _ = write!(
             self.body,
@@ -239,7 +248,7 @@ impl SvgPicture {
         );
     }
 
-    /// A dot.
+    /// Adds a dot.
     pub(crate) fn dot(&mut self, class: &str, at: [f64; 2], radius: f64) {
         let _ = write!(
             self.body,
@@ -248,7 +257,7 @@ impl SvgPicture {
         );
     }
 
-    /// The picture's text; `says` is what it shows, for those who cannot see it.
+    /// The picture as SVG; `says` describes it for screen readers.
     pub(crate) fn finish(self, says: &str) -> String {
         format!(
             r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}">{}</svg>"#,
@@ -260,12 +269,13 @@ impl SvgPicture {
     }
 }
 
-/// Text within an attribute.
+/// A text as the value of an attribute.
 pub(crate) fn attribute(text: &str) -> String {
     escape(text)
 }
 
-/// A curve over an axis, thinned to what can be seen; values that are no numbers are gaps.
+/// The path of a curve, thinned out to `points` points; values that are not finite are gaps. `span` are the values
+/// of `x` at both ends.
 pub(crate) fn line(
     values: &[f64],
     x: &PlotAxis,
@@ -289,7 +299,7 @@ pub(crate) fn line(
     d
 }
 
-/// Least and largest of all finite values.
+/// Smallest and largest of all finite values.
 pub(crate) fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     let finite = values.into_iter().filter(|v| v.is_finite());
     finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
@@ -297,7 +307,7 @@ pub(crate) fn range<'a>(values: impl IntoIterator<Item = &'a f64>) -> [f64; 2] {
     })
 }
 
-/// The range with some room at both ends.
+/// The range extended at both ends by a share of its length.
 pub(crate) fn with_room([low, high]: [f64; 2], share: f64) -> [f64; 2] {
     let room = share * (high - low);
     [low - room, high + room]

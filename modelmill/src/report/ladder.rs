@@ -1,5 +1,5 @@
-//! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic axis with the noise
-//! of the forces.
+//! Picture of the error after each added effect, on the fitted and on the validation runs, on a logarithmic
+//! axis with the noise of the forces.
 
 use modelmill_identify::diagnose::SelectionStep;
 
@@ -7,16 +7,20 @@ use super::draw::{PlotAxis, SvgPicture, WIDTH};
 use crate::diagnose::words::{self, ValidationMethod};
 use crate::text::table::percent;
 
-/// Least height of a step, and that of a line of its label.
+/// Smallest height of a step.
 const ROW: f64 = 46.0;
+/// Height of a line of a label.
 const LINE: f64 = 14.0;
+/// Space above the first step.
 const TOP: f64 = 34.0;
+/// Space left of the axis, for the labels.
 const LEFT: f64 = 290.0;
-/// Longest line of a label.
+/// Largest number of letters of a line of a label.
 const LETTERS: usize = 38;
 
 /// The picture as SVG; `noise` is relative to the force.
 pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMethod) -> String {
+    // The axis covers all errors and the noise.
     let errors = ladder.iter().flat_map(|rung| [rung.fit, rung.check]);
     let all: Vec<f64> = errors.chain([noise]).filter(|e| *e > 0.0).collect();
     let low = all.iter().copied().fold(f64::INFINITY, f64::min);
@@ -38,6 +42,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
     let y = PlotAxis::new([0.0, 1.0], [bottom, TOP]);
     let mut picture = SvgPicture::new(WIDTH, bottom + 40.0);
     picture.frame(&x, &y, "error / force, %", [7, 0]);
+    // The noise is a vertical line with its value.
     if noise > 0.0 {
         let at = x.position(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
@@ -56,6 +61,8 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
         );
     }
     let mut last: Option<[f64; 3]> = None;
+    // One row for each step: two dots, lines to those of the step before, values at the right, label at the
+    // left.
     for (k, rung) in ladder.iter().enumerate() {
         let middle = TOP + row * (k as f64 + 0.5);
         let [fit, check] = [rung.fit, rung.check].map(|e| x.position(100.0 * e));

@@ -1,5 +1,5 @@
-//! Error maps: for each drive the size of the error over the two variables in which it is gathered most, before and after
-//! on one scale.
+//! Error maps: for each drive, the size of the error over the two variables that concentrate it most, before and
+//! after with one scale.
 
 use std::fmt::Write as _;
 
@@ -9,19 +9,19 @@ use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 use crate::text::table::significant;
 
-/// Cells of a map across; few enough that each holds several samples.
+/// Number of cells of a map across; few enough that each has several samples.
 const COLUMNS: usize = 22;
-/// Cells of a map upwards.
+/// Number of cells of a map upwards.
 const ROWS: usize = 14;
-/// Shades of the map; the page has a class for each.
+/// Number of shades of a map; the page has a class for each.
 const SHADES: usize = 9;
-/// Least number of samples of a cell that is shown.
+/// Smallest number of samples of a cell that is shown.
 const LEAST: usize = 2;
 
-/// A variable along the recordings that are judged.
+/// A variable with its name, along the validation runs.
 pub(crate) type MapVariable = (String, Vec<f64>);
 
-/// Where each sample lies in a map; the cells of both variables.
+/// The cells of a map over two variables.
 struct ErrorGrid {
     /// Least and largest value of the variable across.
     x: [f64; 2],
@@ -32,12 +32,14 @@ struct ErrorGrid {
 }
 
 impl ErrorGrid {
+    /// The cells of two variables; `None` if one of them is constant.
     fn new(x: &[f64], y: &[f64]) -> Option<Self> {
         let (of_x, of_y) = (range(x), range(y));
         // A variable that does not change has no cells.
         if !(of_x[1] > of_x[0] && of_y[1] > of_y[0]) {
             return None;
         }
+        // The largest value belongs to the last cell.
         let cell = |v: f64, [low, high]: [f64; 2], n: usize| -> usize {
             #[expect(
                 clippy::cast_possible_truncation,
@@ -68,7 +70,8 @@ impl ErrorGrid {
         sums
     }
 
-    /// How much of the spread of the squared error is between cells, less what as many cells would show by chance.
+    /// The fraction of the variance of the squared error that is between cells, adjusted for what as many cells
+    /// show by chance.
     fn error_concentration(&self, error: &[f64]) -> f64 {
         // Adjusted coefficient of determination of an analysis of variance, with the cell as the only factor.
         let n = error.len() as f64;
@@ -108,7 +111,7 @@ fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// A figure for each drive.
+/// A figure for each drive, with maps before and after the effects.
 pub(crate) fn figures(
     before: &ModelVersion,
     after: Option<&ModelVersion>,
@@ -117,6 +120,7 @@ pub(crate) fn figures(
     let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
+        // Errors on the runs that judge the model.
         let error = before.errors(&judged, d);
         // With a delay the model with effects has other samples.
         let rest = after.map(|after| after.errors(&judged, d));
@@ -139,6 +143,7 @@ pub(crate) fn figures(
         let Some((_, i, j, grid)) = best else {
             continue;
         };
+        // Cells with too few samples stay empty.
         let sizes = |error: &[f64]| -> Vec<Option<f64>> {
             let sums = grid.sums(error).into_iter();
             sums.map(|(count, sum)| (count >= LEAST).then(|| (sum / count as f64).sqrt()))
@@ -149,6 +154,7 @@ pub(crate) fn figures(
             .chain([rest.map(|rest| ("with the effects", sizes(&rest)))])
             .flatten()
             .collect();
+        // Names of the axes with units.
         let names = [i, j].map(|k| {
             let name = &variables[k].0;
             format!("{name}, {}", variable_unit(&before.model, name))
@@ -166,7 +172,8 @@ pub(crate) fn figures(
     html
 }
 
-/// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of the error.
+/// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of
+/// the error.
 fn picture(
     maps: &[(&str, Vec<Option<f64>>)],
     grid: &ErrorGrid,
@@ -174,18 +181,21 @@ fn picture(
     unit: &str,
 ) -> String {
     let (width, height, top) = (330.0, 190.0, 30.0);
+    // Both maps use the scale of the larger error.
     let largest = maps
         .iter()
         .flat_map(|(_, map)| map.iter().flatten())
         .fold(0.0_f64, |m, v| m.max(*v));
     let mut picture = SvgPicture::new(860.0, top + height + 66.0);
     for (k, (title, map)) in maps.iter().enumerate() {
+        // The second map is to the right of the first.
         let left = 62.0 + k as f64 * (width + 62.0);
         let x = PlotAxis::new(grid.x, [left, left + width]);
         let y = PlotAxis::new(grid.y, [top + height, top]);
         picture.text("label", [left, top - 8.0], "start", title);
         let (w, h) = (width / COLUMNS as f64, height / ROWS as f64);
         let mut shades = vec![String::new(); SHADES];
+        // Cells of one shade are one path, so that the file stays small.
         for (cell, size) in map.iter().enumerate() {
             let Some(size) = size else { continue };
             #[expect(
@@ -207,7 +217,7 @@ fn picture(
         }
         picture.frame(&x, &y, &names[0], [5, 4]);
     }
-    // The scale.
+    // The scale of the shades is below the maps.
     let foot = top + height + 48.0;
     for shade in 0..SHADES {
         let at = 62.0 + 16.0 * shade as f64;

@@ -1,5 +1,6 @@
-//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and equations, in the order
-//! in which a user needs them. Input are findings, output is one HTML file that needs no other file.
+//! The page of a diagnosis: verdict, errors, effects, curves, maps, candidates, parameters, recordings and
+//! equations, in the order in which a user needs them. Input are findings, output is one HTML file that needs
+//! no other file.
 
 use std::fmt::Write as _;
 
@@ -24,6 +25,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let name = &findings.before.model.name;
     let title = format!("{name}: effects that the model lacks");
     let mut page = pages::begin(&title);
+    // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
         (
             "ladder",
@@ -61,10 +63,12 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     ];
     // Links to all sections at the top of the page.
     page.push_str("<nav>");
+    // Each link leads to the id of its section.
     for (id, title, _) in &sections {
         let _ = write!(page, "<a href=\"#report-{id}\">{title}</a> ");
     }
     page.push_str("</nav>\n");
+    // The summary is above all sections, so that the result is seen first.
     page.push_str(&summary(findings));
     for (id, title, html) in &sections {
         let _ = write!(
@@ -94,6 +98,7 @@ pub fn scripts() -> impl Iterator<Item = &'static str> {
 
 /// Text between two marks; empty if they are missing.
 pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    // The first occurrence of each mark counts.
     let inner = text
         .split_once(from)
         .and_then(|(_, rest)| rest.split_once(to));
@@ -103,16 +108,19 @@ pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
 /// Verdict and tiles with the main figures.
 fn summary(findings: &DiagnosisFindings) -> String {
     let diagnosis = &findings.diagnosis;
+    // The class of the verdict gives its colour.
     let (class, word) = match diagnosis.verdict {
         DiagnosisVerdict::Adequate => ("adequate", "model is adequate"),
         DiagnosisVerdict::MissingEffect => ("missing", "an effect is missing"),
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
+    // The same sentences as in the text output.
     let says = words::verdict(
         diagnosis,
         &findings.before.model.drives(),
         findings.validation,
     );
+    // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
         tiles.push(("error as it is", percent(Some(first.check))));
@@ -120,8 +128,10 @@ fn summary(findings: &DiagnosisFindings) -> String {
             tiles.push(("with the effects", percent(Some(last.check))));
         }
     }
+    // Errors cannot fall below the noise.
     let noise = words::floor_label(diagnosis.noise_floor);
     tiles.push((noise, percent(Some(diagnosis.noise_floor))));
+    // A list of terms, which also makes sense without style.
     let tiles: Vec<String> = tiles
         .iter()
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
@@ -135,6 +145,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
 
 /// Errors after each added effect, as picture and table, and errors of each drive.
 fn ladder_section(findings: &DiagnosisFindings) -> String {
+    // The picture shows the steps, the table has the numbers.
     let diagnosis = &findings.diagnosis;
     format!(
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
@@ -151,6 +162,7 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
 
 /// Missing effects with next steps, then laws.
 fn missing_section(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
+    // Effects of the library come before laws, which are only hypotheses.
     let mut html = effects(findings, spelling);
     if !findings.laws.is_empty() {
         html.push_str(&laws(findings, spelling));
@@ -166,6 +178,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
         escape(told::HYPOTHESIS)
     );
     for hypothesis in &findings.laws {
+        // Each law with its values, the share that it explains, and its alternatives.
         let law = &hypothesis.law;
         let _ = writeln!(
             html,
@@ -174,6 +187,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             escape(&told::values(law)),
             escape(&told::gain(law))
         );
+        // Alternatives that the recordings do not distinguish.
         if !hypothesis.near_ties.is_empty() {
             html.push_str("<p>These laws explain the recordings equally well:</p>\n<ul>\n");
             for tie in &hypothesis.near_ties {
@@ -181,6 +195,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             }
             html.push_str("</ul>\n");
         }
+        // A law without memory can be added from a library file.
         match &law.entry {
             Some(entry) => {
                 let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
@@ -219,6 +234,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         };
         return format!("<p>{says}</p>\n");
     }
+    // The effects with values, then the steps.
     let mut html = tables::effects(findings);
     if let Err(says) = &findings.after {
         let _ = writeln!(
@@ -228,6 +244,7 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
         );
     }
     let model = &findings.before.model;
+    // The steps: one for each effect, and a new identification.
     let mut commands: Vec<String> = findings
         .entries_to_add()
         .iter()
@@ -257,6 +274,7 @@ fn curves_section(findings: &DiagnosisFindings) -> String {
 
 /// Regions of the error before and after the effects, and error maps.
 fn location(findings: &DiagnosisFindings) -> String {
+    // Both models are shown if the second one could be built.
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
     html.push_str(&sentences(
@@ -276,6 +294,7 @@ fn location(findings: &DiagnosisFindings) -> String {
             &findings.variables,
         ));
     }
+    // Regions of the residual are listed without pictures.
     if let Some(left) = &findings.residual_locations {
         html.push_str("<h3>Residual with the effects</h3>\n");
         html.push_str(&sentences(left, "The residual"));
@@ -299,6 +318,7 @@ fn location(findings: &DiagnosisFindings) -> String {
 /// A sentence in place of regions: the error is rounding, or no region stands out.
 fn sentences(places: &ErrorLocations, what: &str) -> String {
     let mut html = String::new();
+    // Regions of rounding errors would mislead.
     if !places.rounding.is_empty() {
         let _ = writeln!(
             html,
@@ -351,6 +371,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
 
 /// The page of equations inside this page: its anchors get a prefix, its headings go down two levels.
 fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
+    // Only the main part is taken; styles and scripts are on this page already.
     let inner = text_between(page, "<main>", "</main>")
         .replace(" id=\"", " id=\"equations-")
         .replace("href=\"#", "href=\"#equations-");
@@ -362,6 +383,7 @@ fn embed_equations(findings: &DiagnosisFindings, page: &str) -> String {
             .replace(&format!("<{from}>"), &format!("<{to}>"))
             .replace(&format!("</{from}>"), &format!("</{to}>"));
     }
+    // The summary of the folded part names the model.
     let what = if findings.after.is_ok() {
         "The model with the effects"
     } else {

@@ -1,5 +1,5 @@
-//! Regions where the error is largest: a sentence and a picture for each, with mean and standard deviation of the error over the
-//! variable of the region.
+//! Regions where the error is largest: a sentence and a picture for each, with mean and standard deviation of
+//! the error over the variable of the region.
 
 use std::cmp::Ordering;
 use std::fmt::Write as _;
@@ -16,8 +16,11 @@ use crate::text::table::significant;
 
 /// Segments of the variable in a picture.
 const BINS: usize = 44;
+/// Width of a picture.
 const WIDTH: f64 = 420.0;
+/// Height of a picture.
 const HEIGHT: f64 = 190.0;
+/// Space for the ticks at the left.
 const LEFT: f64 = 58.0;
 
 /// A figure for each region of the error of the model as it is.
@@ -29,6 +32,7 @@ pub(crate) fn figures(
 ) -> String {
     let mut html = String::from("<div class=\"grid\">\n");
     for region in regions {
+        // A region without samples has a sentence only.
         let picture = picture(region, before, after, variables).unwrap_or_default();
         let _ = writeln!(
             html,
@@ -43,6 +47,7 @@ pub(crate) fn figures(
 /// A region in one sentence; every number has its unit.
 pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     let unit = variable_unit(model, &region.variable);
+    // Units make the sentence readable without the picture.
     let [low, high] = region.range;
     let name = if region.variable == TIME_COLUMN {
         "time"
@@ -75,7 +80,8 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     )
 }
 
-/// Picture of a region: mean and standard deviation of the error over the variable, before and after. `None` without samples.
+/// Picture of a region: mean and standard deviation of the error over the variable, before and after. `None`
+/// without samples.
 fn picture(
     region: &ErrorRegion,
     before: &ModelVersion,
@@ -102,6 +108,7 @@ fn picture(
     } else {
         judged
     };
+    // The variable along the same runs as the errors.
     let over: Vec<f64> = if region.variable == TIME_COLUMN {
         before.runs[*runs.first()?].time.clone()
     } else {
@@ -110,15 +117,18 @@ fn picture(
             .find(|(name, _)| *name == region.variable)?;
         values.clone()
     };
+    // Errors before and after the effects.
     let mut curves = vec![("c-before", before.errors(&runs, d))];
     if let Some(after) = after {
         curves.push(("c-after", after.errors(&runs, d)));
     }
+    // With a delay the model with effects may have other samples.
     curves.retain(|(_, error)| error.len() == over.len());
     let bins: Vec<(&str, Vec<ErrorBin>)> = curves
         .iter()
         .map(|(class, error)| (*class, bin_errors(&over, error)))
         .collect();
+    // The axis upwards covers mean and standard deviation of all curves.
     let bounds: Vec<f64> = bins
         .iter()
         .flat_map(|(_, bins)| {
@@ -129,10 +139,12 @@ fn picture(
     if bounds.is_empty() {
         return None;
     }
+    // The axis across covers all samples.
     let x = PlotAxis::new(range(&over), [LEFT, WIDTH - 10.0]);
     let y = PlotAxis::new(with_room(range(&bounds), 0.06), [HEIGHT - 36.0, 8.0]);
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     let [low, high] = region.range.map(|v| x.position(v));
+    // The region is shaded below the curves.
     picture.rect("region", [low, y.start], [high.max(low + 1.0), y.end]);
     let unit = variable_unit(model, &region.variable);
     let name = if region.variable == TIME_COLUMN {
@@ -142,9 +154,11 @@ fn picture(
     };
     let title = format!("{name}, {unit} (error in {})", force_unit(model, d));
     picture.frame(&x, &y, &title, [5, 4]);
+    // A band of one standard deviation, and the mean as a line in it.
     for (class, bins) in &bins {
         let (mut upper, mut lower, mut mean) = (String::new(), String::new(), String::new());
         for (k, bin) in bins.iter().enumerate() {
+            // The band is a closed path: up along one side, back along the other.
             let at = x.position(bin.at);
             let pen = if k == 0 { 'M' } else { 'L' };
             let _ = write!(mean, "{pen}{at:.1} {:.1}", y.position(bin.mean));
@@ -161,19 +175,24 @@ fn picture(
     Some(picture.finish(&region.says))
 }
 
-/// A segment of a variable: its middle, mean and standard deviation of the error there.
+/// Error statistics in a segment of a variable.
 struct ErrorBin {
+    /// Middle of the segment, in the unit of the variable.
     at: f64,
+    /// Mean of the error, N or N m.
     mean: f64,
+    /// Standard deviation of the error.
     spread: f64,
 }
 
-/// Mean and standard deviation of an error in segments of equal length; segments with fewer than three samples are left out.
+/// Mean and standard deviation of an error in segments of equal length; segments with fewer than three samples
+/// are left out.
 fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
     let [low, high] = range(over);
     if high.partial_cmp(&low) != Some(Ordering::Greater) {
         return Vec::new();
     }
+    // Number, sum and sum of squares of the error in each segment.
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
     for (v, e) in over
         .iter()
@@ -189,6 +208,7 @@ fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
         let sum = &mut sums[k.min(BINS - 1)];
         *sum = (sum.0 + 1.0, sum.1 + e, sum.2 + e * e);
     }
+    // Means of very few samples would only show noise.
     let bins = sums.iter().enumerate().filter(|(_, (n, _, _))| *n >= 3.0);
     bins.map(|(k, (n, sum, squares))| {
         let mean = sum / n;

@@ -1,4 +1,5 @@
-//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base parameter over the runs.
+//! Differences between runs as one self-contained HTML page: changes, when they happened, and every base
+//! parameter over the runs.
 
 use std::fmt::Write as _;
 
@@ -16,14 +17,15 @@ use crate::text::table::{count, significant};
 
 /// Height of a picture of one parameter.
 const HEIGHT: f64 = 170.0;
-/// How many standard deviations a bar reaches up and down.
+/// Length of a bar to either side, in standard deviations.
 const BARS: f64 = 2.0;
 
-/// The HTML quantity the page; `spelling` writes commands or calls for its reader.
+/// The HTML of the page; `spelling` writes commands or calls for its reader.
 pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
     let title = format!("{}: changes between runs", compared.model);
     let mut page = pages::begin(&title);
     page.push_str(&summary(compared));
+    // The sections in the order in which a user needs them, each with its id and title.
     let mut sections = vec![
         ("when", "Lasting changes", points(compared)),
         (
@@ -32,6 +34,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
             changes_table(compared),
         ),
     ];
+    // The joint fit exists only if it was requested.
     if let Some(shared) = &compared.shared {
         sections.push(("own", "Joint fit of all runs", shared_fit_section(shared)));
     }
@@ -54,6 +57,7 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
 /// The verdict: lasting changes, and how many runs differ from the first.
 fn summary(compared: &RunsComparison) -> String {
     let later = compared.runs.len() - 1;
+    // The first run is the reference.
     let changed = compared.runs.iter().skip(1);
     let changed = changed.filter(|run| !run.changes.is_empty()).count();
     // The colour of the verdict.
@@ -62,6 +66,7 @@ fn summary(compared: &RunsComparison) -> String {
     } else {
         "missing"
     };
+    // Lasting changes count more than single runs, so they come first.
     let mut says = match compared.points.len() {
         0 => String::new(),
         n => format!("{}. ", count(n, "lasting change", "lasting changes")),
@@ -77,6 +82,7 @@ fn summary(compared: &RunsComparison) -> String {
 /// Changes as a list, each with those that explain the runs equally well.
 fn changes_list(changes: &[RunChange]) -> String {
     let mut html = String::from("<ul>\n");
+    // One item for each change, with its alternatives in small type.
     for one in changes {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
@@ -98,6 +104,7 @@ fn points(compared: &RunsComparison) -> String {
         return "<p>No base parameter changed for two or more runs.</p>\n".to_owned();
     }
     let mut html = String::new();
+    // The file is named, since numbers of runs are hard to find again.
     for point in &compared.points {
         let file = escape(&compared.runs[point.run].file);
         let _ = writeln!(html, "<h3>From run {} on: {file}</h3>", point.run + 1);
@@ -106,6 +113,7 @@ fn points(compared: &RunsComparison) -> String {
         } else {
             html.push_str(&changes_list(&point.changes));
         }
+        // Means of the parameters before and since the change.
         let rows: Vec<Vec<TableCell>> = (point.steps.iter())
             .map(|step| {
                 let info = &compared.parameters[step.parameter];
@@ -132,6 +140,7 @@ fn points(compared: &RunsComparison) -> String {
 
 /// A value with its standard deviation as a cell.
 fn value(fitted: Option<FittedValue>) -> TableCell {
+    // A value without standard deviation was not determined.
     match fitted {
         Some(FittedValue {
             value,
@@ -167,6 +176,7 @@ fn shared_fit_section(shared: &SharedFit) -> String {
     let mut html = String::from(
         "<p>All runs share their base parameters. The values below belong to one run each.</p>\n",
     );
+    // Factors of force signals exist only with a known load.
     if !shared.gains.is_empty() {
         html.push_str(
             "<p>True force = factor times measured force, determined by the known load.</p>\n",
@@ -176,6 +186,7 @@ fn shared_fit_section(shared: &SharedFit) -> String {
             .collect();
         html.push_str(&table("gains", &["drive", "#factor"], &rows));
     }
+    // One row for each value of each run.
     let rows: Vec<Vec<TableCell>> = (shared.runs.iter())
         .flat_map(|(file, values)| {
             values.iter().map(move |one| {
@@ -203,6 +214,7 @@ fn parameters(compared: &RunsComparison) -> String {
         let mut steps = compared.points.iter().flat_map(|point| &point.steps);
         steps.any(|step| step.parameter == *k)
     };
+    // A parameter that no run determines has no picture.
     let is_determined = |k: &usize| {
         compared
             .runs
@@ -236,9 +248,11 @@ fn determined(fitted: FittedValue) -> Option<[f64; 2]> {
 /// One base parameter over the runs.
 fn picture(compared: &RunsComparison, k: usize) -> String {
     let runs = &compared.runs;
+    // Runs that do not determine the parameter leave a gap.
     let known: Vec<(usize, [f64; 2])> = (runs.iter().enumerate())
         .filter_map(|(at, run)| Some((at, determined(run.alone[k])?)))
         .collect();
+    // Levels before and since each lasting change.
     let steps = compared.points.iter().flat_map(|point| {
         let own = point.steps.iter().filter(|step| step.parameter == k);
         own.map(move |step| (point.run, [step.before.value, step.now.value]))
@@ -247,8 +261,8 @@ fn picture(compared: &RunsComparison, k: usize) -> String {
     parameter_history(&compared.parameters[k], "run", runs.len(), &known, &steps)
 }
 
-/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and standard deviation;
-/// `steps` has the index of the first run of each change with the mean before and since.
+/// Picture of a base parameter over `n` runs or days (`what`). `known` has the index of a run with value and
+/// standard deviation; `steps` has the index of the first run of each change with the mean before and since.
 pub fn parameter_history(
     info: &ParameterInfo,
     what: &str,
@@ -260,16 +274,19 @@ pub fn parameter_history(
     let ends: Vec<f64> = (known.iter())
         .flat_map(|(_, [x, d])| [x - BARS * d, x + BARS * d])
         .collect();
+    // The first run is at 1, with half a step of room at each end.
     let x = PlotAxis::new([0.5, n as f64 + 0.5], [LEFT, WIDTH - RIGHT]);
     let y = PlotAxis::new(with_room(range(&ends), 0.05), [HEIGHT - 40.0, 8.0]);
     let mut picture = SvgPicture::new(WIDTH, HEIGHT);
     picture.frame(&x, &y, what, [n.min(12), 4]);
+    // One bar and one dot for each run that determines the parameter.
     for (at, [value, deviation]) in known {
         let across = x.position(*at as f64 + 1.0);
         let [low, high] = [-BARS, BARS].map(|b| y.position(value + b * deviation));
         picture.path("curve c-fit", &format!("M{across:.1} {low:.1}V{high:.1}"));
         picture.dot("dot c-before", [across, y.position(*value)], 2.4);
     }
+    // Levels between the changes, and a vertical line at each of them.
     for (i, (run, [before, now])) in steps.iter().enumerate() {
         let start = if i == 0 { 0 } else { steps[i - 1].0 };
         let end = steps.get(i + 1).map_or(n, |next| next.0);
@@ -280,6 +297,7 @@ pub fn parameter_history(
             let d = format!("M{:.1} {level:.1}H{:.1}", at(start), at(*run));
             picture.path("curve c-after", &d);
         }
+        // The level lasts until the next change.
         let level = y.position(*now);
         picture.path(
             "curve c-after",
@@ -302,6 +320,7 @@ pub fn parameter_history(
 
 /// All runs with their sizes, and those that could not be evaluated with the reason.
 fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
+    // Runs are numbered from 1, as everywhere in the output.
     let mut rows: Vec<Vec<TableCell>> = (compared.runs.iter().enumerate())
         .map(|(k, run)| {
             vec![
@@ -312,6 +331,7 @@ fn runs(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> String {
             ]
         })
         .collect();
+    // Failed runs are listed too, so that none is missed.
     rows.extend(compared.unread.iter().map(|one| {
         let says = TableCell::text(&format!("not evaluated: {}", one.error.spell(spelling)));
         vec![

@@ -8,14 +8,17 @@ use super::units::force_unit;
 use crate::diagnose::ModelVersion;
 use crate::text::svg::escape;
 
+/// Height of a picture.
 const HEIGHT: f64 = 170.0;
-/// Samples of a segment.
+/// Largest number of samples of a segment.
 const SEGMENT: usize = 2048;
-/// Frequencies, evenly spaced in decades.
+/// Number of frequencies, evenly spaced on a logarithmic axis.
 const FREQUENCIES: usize = 140;
 
-/// Density of a signal at some frequencies, unit^2/Hz: `(frequency in Hz, density)`.
+/// Power spectral density of a signal at some frequencies, one-sided: `(frequency in Hz, unit^2/Hz)`. `rate` is the
+/// sampling rate, Hz. Empty for fewer than 32 samples.
 pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
+    // Short signals are one segment, very short ones have no spectrum.
     let n = SEGMENT.min(signal.len());
     if n < 32 || !(rate > 0.0 && rate.is_finite()) {
         return Vec::new();
@@ -24,6 +27,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
     let window: Vec<f64> = (0..n)
         .map(|i| 0.5 - 0.5 * (TAU * (i as f64 + 0.5) / n as f64).cos())
         .collect();
+    // The window removes power, for which the density is corrected.
     let power: f64 = window.iter().map(|w| w * w).sum();
     // Segments overlap by half, as Welch recommends for this window.
     let starts: Vec<usize> = (0..=signal.len() - n).step_by(n / 2).collect();
@@ -31,6 +35,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
         .iter()
         .map(|start| {
             let part = &signal[*start..start + n];
+            // The mean would leak into low frequencies.
             let mean = part.iter().sum::<f64>() / n as f64;
             part.iter()
                 .zip(&window)
@@ -38,6 +43,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
                 .collect()
         })
         .collect();
+    // Frequencies are bins of the discrete Fourier transform; low ones may coincide.
     let mut bins: Vec<usize> = (0..FREQUENCIES)
         .map(|k| {
             let share = k as f64 / (FREQUENCIES - 1) as f64;
@@ -86,6 +92,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             if n < 2 {
                 return Vec::new();
             }
+            // The mean rate after decimation.
             let rate = (n - 1) as f64 / (run.time[n - 1] - run.time[0]);
             density(&run.error(d), rate)
         };
@@ -94,6 +101,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             after.map(|v| ("c-after", of(v))),
         ];
         let curves: Vec<(&str, Vec<(f64, f64)>)> = curves.into_iter().flatten().collect();
+        // The picture shows amplitude densities, whose unit is that of the force per root of Hz.
         let roots: Vec<f64> = curves
             .iter()
             .flat_map(|(_, c)| c.iter().map(|(_, v)| v.sqrt()))
@@ -106,6 +114,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
         if roots.is_empty() {
             continue;
         }
+        // Both axes are logarithmic, since densities cover decades.
         let x = PlotAxis::decades(range(&frequencies), [LEFT, WIDTH - RIGHT]);
         let [low, high] = range(&roots);
         let y = PlotAxis::decades(

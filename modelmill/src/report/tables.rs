@@ -12,24 +12,24 @@ use crate::print::StepSpelling;
 use crate::text::svg::escape;
 use crate::text::table::{percent, significant};
 
-/// Candidates that are shown unfolded.
+/// Number of candidates that are shown before the others are folded.
 const FIRST: usize = 20;
 
 /// A cell: its HTML, and the number by which a column is sorted.
 pub struct TableCell(String, Option<f64>);
 
 impl TableCell {
-    /// A text.
+    /// A cell with text, which is escaped here so that no caller can forget it.
     pub fn text(text: &str) -> Self {
         Self(escape(text), None)
     }
 
-    /// A number as it is shown, and its value.
+    /// A cell with a number as it is shown, and its value for sorting.
     pub fn number(text: &str, value: f64) -> Self {
         Self(escape(text), Some(value))
     }
 
-    /// Finished HTML.
+    /// A cell with finished HTML.
     pub fn html(html: String) -> Self {
         Self(html, None)
     }
@@ -37,7 +37,9 @@ impl TableCell {
 
 /// A table as HTML. Heads that begin with `#` mark columns of numbers, which are aligned right and sorted by value.
 pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
+    // Wide tables scroll within the page.
     let mut html = format!("<div class=\"wide\"><table class=\"{class}\">\n<thead><tr>");
+    // The mark of number columns is not shown.
     for name in head {
         let (class, name) = match name.strip_prefix('#') {
             Some(name) => (" class=\"number\"", name),
@@ -46,6 +48,7 @@ pub fn table(class: &str, head: &[&str], rows: &[Vec<TableCell>]) -> String {
         let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", escape(name));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
+    // The value of a number is an attribute, since the shown text has a unit or is rounded.
     for row in rows {
         html.push_str("<tr>");
         for (k, TableCell(text, value)) in row.iter().enumerate() {
@@ -67,8 +70,11 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
         .steps
         .iter()
         .map(|rung| {
+            // Shares are sorted by value, not by text.
             let percents = |v: f64| TableCell::number(&percent(Some(v)), v);
+            // Gain, its certainty and the samples on which they are based.
             let evidence = rung.evidence;
+            // A step without evidence, such as the first, has empty cells.
             let of = |f: &dyn Fn() -> Option<(String, f64)>| match f() {
                 Some((text, value)) => TableCell::number(&text, value),
                 None => TableCell::text(""),
@@ -86,6 +92,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
             ]
         })
         .collect();
+    // The head says on which data errors were judged.
     let check = format!("#error, {}", findings.validation.label());
     table(
         "",
@@ -105,6 +112,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
 pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     // The same figure as in the text: rms of the error over rms of the measured force, on the data that are judged.
     let nrms = |version: &ModelVersion, d: usize| -> f64 {
+        // Each model version has its own errors, on the same runs.
         let runs = version.validation_runs();
         let error = version.errors(&runs, d);
         let force = runs.iter().flat_map(|k| &version.runs[*k].measured[d]);
@@ -125,6 +133,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
         .map(|(d, drive)| {
             let unit = force_unit(&before.model, d);
             let noise = findings.answer.problem.noise[d];
+            // Error before, error after if there is a model with effects, and noise.
             let mut row = vec![TableCell::text(drive)];
             let first = nrms(before, d);
             row.push(TableCell::number(&percent(Some(first)), first));
@@ -139,6 +148,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
             row
         })
         .collect();
+    // The column of the model with effects exists only if it could be built.
     let mut head = vec!["drive", "#error of the model as it is"];
     if findings.after.is_ok() {
         head.push("#error with the effects");
@@ -147,8 +157,8 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
     table("", &head, &rows)
 }
 
-/// Missing effects: for each kind its meaning once, and for each place values and effects that explain the recordings equally
-/// well.
+/// Missing effects: for each kind its meaning once, and for each place values and effects that explain the
+/// recordings equally well.
 pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
     let answer = &findings.answer;
     // Kinds in the order of their first effect, so that a text about a kind is not repeated for each of its places.
@@ -161,16 +171,20 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
         }
     }
     let mut html = String::new();
+    // One section for each kind: meaning, places with values, explanation.
     for (name, all) in kinds {
+        // A single place is named in the heading, several are listed.
         let title = match all.as_slice() {
             [one] => words::effect(&one.effect),
             _ => format!("{} ({} times)", words::kind(name), all.len()),
         };
         let _ = writeln!(html, "<h3>{}</h3>", escape(&capitalise(&title)));
         let kind = answer.candidates.kinds.iter().find(|k| k.name == name);
+        // What the kind means, in one sentence.
         if let Some(kind) = kind {
             let _ = writeln!(html, "<p>{}</p>", escape(&kind.says));
         }
+        // Values of each place.
         if let [one] = all.as_slice() {
             html.push_str(&effect(findings, one, ""));
         } else {
@@ -181,6 +195,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
             }
             html.push_str("</ul>\n");
         }
+        // Longer explanations are folded.
         if let Some(kind) = kind {
             let texts = [&kind.explains, &kind.doubles];
             let texts: Vec<String> = texts
@@ -202,6 +217,7 @@ pub(crate) fn effects(findings: &DiagnosisFindings) -> String {
 
 /// Values of one effect behind a label, and the effects that explain the recordings equally well.
 fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -> String {
+    // Parameters are estimated linearly, constants by search.
     let parameters = &findings.answer.problem.candidates[found.candidate].parameters;
     let values = parameters.iter().zip(&found.estimates).map(|(p, value)| {
         format!(
@@ -218,11 +234,13 @@ fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -
             significant(*value, 3)
         )
     });
+    // A kind without parameters has no values to show.
     let all: Vec<String> = values.chain(constants).collect();
     let mut html = String::new();
     if !all.is_empty() || !label.is_empty() {
         let _ = writeln!(html, "<p>{}{}</p>", escape(label), all.join(", "));
     }
+    // Alternatives belong to the effect, since either may be true.
     if !found.indistinguishable_from.is_empty() {
         let others = found.indistinguishable_from.iter().map(words::effect);
         let others: Vec<String> = others.collect();
@@ -235,7 +253,7 @@ fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -
     html
 }
 
-/// Text with a capitalise first letter.
+/// Text with a capital first letter.
 fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| {
@@ -253,7 +271,9 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
         "#gain in addition to the effects found",
         "result",
     ];
+    // The reason of a rejection depends on whether any effect was found.
     let has_effects = !findings.diagnosis.effects.is_empty();
+    // Candidates that were found have no reason of rejection.
     let row = |c: &CandidateOutcome| -> Vec<TableCell> {
         let verdict = match &c.rejection_reason {
             None => TableCell::html("<b>found</b>".to_owned()),
@@ -284,6 +304,7 @@ pub(crate) fn candidates(findings: &DiagnosisFindings) -> String {
 
 /// A share in per cent; less than 0.05 % is printed as 0.
 fn percent_cell(value: f64) -> TableCell {
+    // One digit after the point for small shares.
     let percents = 100.0 * value;
     let text = if percents.abs() < 0.05 {
         "0 %".to_owned()
@@ -297,6 +318,7 @@ fn percent_cell(value: f64) -> TableCell {
 
 /// Identified base parameters, their nominal values and standard deviations.
 pub(crate) fn parameters(version: &ModelVersion) -> String {
+    // With fixed parameters there is nothing to list.
     let Some(result) = &version.identified else {
         return "<p>All parameters are fixed at their nominal values.</p>\n".to_owned();
     };
@@ -305,9 +327,12 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
         let nominal = p
             .nominal
             .filter(|_| !version.model.is_effect(k) && version.model.has_nominal(k));
+        // Four digits are enough for comparison; JSON has all of them.
         let number = |v: f64| TableCell::number(&significant(v, 4), v);
         let none = || TableCell::text("");
+        // A standard deviation has a meaning for identified values only.
         let std = p.std.filter(|_| p.status == ParameterStatus::Identified);
+        // How far the value is from the file.
         let off = match (nominal, std) {
             (Some(nominal), Some(std)) if std > 0.0 => Some((p.value - nominal).abs() / std),
             _ => None,
@@ -331,6 +356,7 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
             },
             TableCell::text(&typographic_unit(&p.unit)),
             off.map_or_else(none, |off| {
+                // Beyond this the exact number has no meaning.
                 let text = if off >= 1000.0 {
                     "> 1000".to_owned()
                 } else {
@@ -364,6 +390,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
         .iter()
         .map(|run| {
             let n = run.time.len();
+            // Duration and mean sample rate.
             let span = match (run.time.first(), run.time.last()) {
                 (Some(first), Some(last)) => last - first,
                 _ => 0.0,

@@ -7,7 +7,8 @@ pub(crate) fn force_unit(model: &Model, drive: usize) -> &'static str {
     model.force_unit(drive)
 }
 
-/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a force, the time.
+/// Unit of a variable by its name: a coordinate or the length of a drive, their rates and accelerations, a
+/// force, the time.
 pub(crate) fn variable_unit(model: &Model, name: &str) -> String {
     let mechanism = &model.derivation.mechanism;
     if name == modelmill_identify::TIME_COLUMN {

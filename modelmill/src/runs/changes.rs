@@ -1,7 +1,8 @@
-//! What a change is in physics.
+//! Physical changes between runs: their kinds, values and texts.
 //!
-//! Decision: where a drive carries nothing but its friction, more friction and a larger force scale are the same.
-//! Friction changes every day and sensors hardly ever, so friction is named first and the scale as its alternative.
+//! Decision: at a drive whose only force is its own friction, more friction and a larger scale of the force are
+//! indistinguishable. Friction changes every day and sensors hardly ever, so friction is named first and the scale
+//! as its alternative.
 
 use modelmill_identify::changes::{JointValues, PossibleChange, SelectedChange};
 use modelmill_spec::{DriveKind, EffectPlace};
@@ -13,16 +14,17 @@ use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::{PayloadColumns, TEN};
 use crate::text::table::{significant, with_deviation};
 
-/// A value with its standard deviation.
+/// An estimated value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChangeEstimate {
-    /// The value.
+    /// The value, in the unit of the quantity.
     pub value: f64,
-    /// Its standard deviation.
+    /// Its standard deviation, in the same unit.
     pub deviation: f64,
 }
 
 impl ChangeEstimate {
+    /// The value with its standard deviation and unit.
     fn text(self, unit: &str) -> String {
         let [value, deviation] = with_deviation(self.value, self.deviation);
         format!("{value} +- {deviation} {unit}")
@@ -30,80 +32,81 @@ impl ChangeEstimate {
             .to_owned()
     }
 
-    /// Whether it is known to a third of its size.
+    /// Whether its standard deviation is below a third of its size.
     fn is_known(self) -> bool {
         3.0 * self.deviation < self.value.abs()
     }
 }
 
-/// What changed.
+/// A physical change of the machine or of its recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PhysicalChange {
     /// Another load on a body.
     Payload {
-        /// The frame that carries it.
+        /// The frame that carries the load.
         frame: String,
-        /// What it weighs, kg; `None` where the motion does not tell.
+        /// Mass of the load, kg; `None` if the motion does not determine it.
         mass: Option<ChangeEstimate>,
-        /// Its centre in the frame, m; `None` for directions that the motion does not tell.
+        /// Centre of the load in the frame, m; `None` for directions that the motion does not determine.
         centre: [Option<ChangeEstimate>; 3],
     },
-    /// Other friction of a drive.
+    /// Changed friction of a drive.
     Friction {
         /// The drive.
         drive: String,
-        /// Dry friction, N or N m.
+        /// Change of the dry friction, N or N m.
         dry: ChangeEstimate,
-        /// Viscous friction, N or N m per m/s or rad/s.
+        /// Change of the viscous friction, N or N m per m/s or rad/s.
         viscous: ChangeEstimate,
-        /// Both as parts of what the first run has, where the model has such friction.
+        /// Both relative to the friction in the first run, if the model has such friction.
         parts: [Option<f64>; 2],
     },
-    /// Another constant force of a drive, N or N m.
+    /// A changed constant force of a drive.
     Offset {
         /// The drive.
         drive: String,
-        /// The force.
+        /// Change of the force, N or N m.
         force: ChangeEstimate,
     },
-    /// Another scale of a drive's measured force.
+    /// A changed scale of a drive's measured force.
     Scale {
         /// The drive.
         drive: String,
-        /// The factor; 1 where nothing changed.
+        /// The factor; 1 without a change.
         factor: ChangeEstimate,
     },
-    /// Another clock.
+    /// A changed clock.
     Clock {
-        /// How many times as fast as its time stamps say the run was; 1 where nothing changed.
+        /// Ratio of the true speed to that of the time stamps; 1 without a change.
         factor: ChangeEstimate,
     },
     /// A contact or a push within the run.
     ContactEvent {
-        /// The drives on which it shows, each with the largest force that nothing explains, N or N m.
+        /// The drives on which it acts, each with the largest unexplained force, N or N m.
         drives: Vec<(String, f64)>,
-        /// When it begins and ends, s.
+        /// Start and end, s.
         interval: [f64; 2],
     },
-    /// Another zero of an encoder.
+    /// A changed zero of an encoder.
     EncoderZero {
         /// The coordinate.
         coordinate: String,
-        /// By how much the true position lies above the recorded one, rad or m.
+        /// True position minus recorded position, rad or m.
         shift: ChangeEstimate,
     },
 }
 
-/// A value with its name and unit.
+/// A value with its symbol and unit.
 pub type NamedEstimate = (&'static str, ChangeEstimate, &'static str);
 
 impl PhysicalChange {
-    /// What scripts call it, where it is, and its values with their names and units; `unit` is that of the force or coordinate.
+    /// The kind for scripts, its places, and its values with symbols and units; `unit` is the unit of the force or
+    /// coordinate.
     pub fn parts(&self, unit: &'static str) -> (&'static str, Vec<&str>, Vec<NamedEstimate>) {
         let (kind, at, estimates) = match self {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();
-                // An event is told by its samples, which lie a step apart.
+                // The times of an event are those of samples, so that they have no standard deviation.
                 let [from, to] = interval.map(|value| ChangeEstimate {
                     value,
                     deviation: 0.0,
@@ -144,46 +147,53 @@ impl PhysicalChange {
     }
 }
 
-/// A change of a run against the first one.
+/// A change of a run relative to the first run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunChange {
-    /// What it is.
+    /// The physical change.
     pub change: PhysicalChange,
-    /// By how much the sum of squares of the white residual would rise without it; 0 for events, which are looked for by
-    /// themselves.
+    /// Rise of the sum of squares of the white residual without the change; 0 for events, which are found
+    /// separately.
     pub gain: f64,
-    /// Unit of its values where it is that of a drive or a coordinate.
+    /// Unit of its values, if that depends on the drive or coordinate.
     pub unit: &'static str,
-    /// Changes that explain nearly as much in its place, in words.
+    /// Names of changes that explain nearly as much in its place.
     pub rivals: Vec<String>,
-    /// The change in words.
+    /// The change as text.
     pub says: String,
 }
 
-/// Kinds of change, each with the drive or frame that it belongs to.
+/// Kinds of change, each with the frame, drive or coordinate that it belongs to.
 #[derive(Clone, Debug)]
 pub(crate) enum ChangeKind {
+    /// A load on a frame, by its name.
     Payload(String),
+    /// Friction of a drive, by its index.
     Friction(usize),
+    /// A constant force on a drive, by its index.
     Offset(usize),
+    /// The scale of a drive's measured force, by its index.
     Scale(usize),
+    /// The clock of the run.
     Clock,
+    /// The zero of an encoder, by the index of the active coordinate.
     EncoderZero(usize),
 }
 
-/// A change that is possible.
+/// A hypothesis of the search.
 #[derive(Clone, Debug)]
 pub(crate) struct ChangeHypothesis {
+    /// The kind and its place.
     pub(crate) kind: ChangeKind,
-    /// What the search knows of it.
+    /// Its columns and its cost in the search.
     pub(crate) candidate: PossibleChange,
 }
 
-/// What a drive's other scale is charged beside its value: friction changes every day, sensors, torque constants and gears
-/// hardly ever. It decides where both explain the same, as at a drive that carries nothing but its own friction.
+/// Additional cost of a changed scale, since friction changes every day, but sensors, torque constants and gears
+/// hardly ever. It decides if both explain the same, as at a drive whose only force is its own friction.
 const RARE: f64 = 0.2;
 
-/// All changes that are possible.
+/// All hypotheses of the search: payloads, then friction, offset and scale of each drive, clock, zeros of encoders.
 pub(crate) fn possible_changes(
     model: &Model,
     payloads: &PayloadColumns,
@@ -191,7 +201,7 @@ pub(crate) fn possible_changes(
 ) -> Vec<ChangeHypothesis> {
     let possible = |kind: ChangeKind, columns: Vec<usize>| {
         let (most, rarity) = match kind {
-            // Dry and viscous friction rise and fall together.
+            // Dry and viscous friction usually change together, so that they cost as much as one value.
             ChangeKind::Friction(_) => (1, 0.0),
             ChangeKind::Scale(_) => (1, RARE),
             _ => (columns.len(), 0.0),
@@ -230,7 +240,7 @@ pub(crate) fn possible_changes(
     all
 }
 
-/// A change that was found, with what it is; `values` are the base parameters of the first run that are no known numbers.
+/// A change that was found, with its physical meaning; `values` are the unknown base parameters of the first run.
 pub(crate) fn identified_change(
     model: &Model,
     possible: &[ChangeHypothesis],
@@ -251,7 +261,7 @@ pub(crate) fn identified_change(
     }
 }
 
-/// A contact or a push within a run.
+/// The change of a contact or push within a run.
 pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     let names = model.drives();
     let drives = event.drives.iter();
@@ -270,6 +280,7 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     }
 }
 
+/// The physical values of a change that was found.
 fn physical_change(
     model: &Model,
     kind: &ChangeKind,
@@ -283,6 +294,7 @@ fn physical_change(
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
         ChangeKind::Payload(frame) => {
+            // Mass and centre are given only if the mass is known.
             let mass = found.determined[0]
                 .then(|| estimate(0))
                 .filter(|m| m.is_known());
@@ -297,6 +309,7 @@ fn physical_change(
             }
         }
         ChangeKind::Friction(d) => {
+            // Relative changes exist only if the model has friction on this drive.
             let before = friction(model, *d).map(|k| k.map(|k| values[k]));
             let part = |i: usize| before[i].filter(|f| *f != 0.0).map(|f| found.values[i] / f);
             PhysicalChange::Friction {
@@ -324,7 +337,7 @@ fn physical_change(
     }
 }
 
-/// The unit of a force of a drive, or of a coordinate.
+/// The unit of the values of a change: of a force, a coordinate, or none.
 fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
         ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => {
@@ -336,11 +349,12 @@ fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     }
 }
 
-/// The unit of viscous friction of a drive whose force has the unit.
+/// The unit of viscous friction of a drive, from the unit of its force.
 pub(crate) fn viscous_unit(unit: &str) -> &'static str {
     if unit == "N" { "N s/m" } else { "N m s/rad" }
 }
 
+/// A factor from its difference to 1.
 fn one_plus(part: ChangeEstimate) -> ChangeEstimate {
     ChangeEstimate {
         value: 1.0 + part.value,
@@ -348,19 +362,20 @@ fn one_plus(part: ChangeEstimate) -> ChangeEstimate {
     }
 }
 
-/// Columns of a drive's dry and viscous friction, where they are base parameters of their own.
+/// Columns of a drive's dry and viscous friction, if they are separate base parameters.
 pub(crate) fn friction(model: &Model, drive: usize) -> [Option<usize>; 2] {
     ["coulomb_friction", "viscous_friction"].map(|kind| column_of(model, drive, kind))
 }
 
-/// The column of a drive's constant force, where it is a base parameter of its own.
+/// The column of a drive's constant force, if it is a separate base parameter.
 pub(crate) fn offset(model: &Model, drive: usize) -> Option<usize> {
     column_of(model, drive, "force_offset")
 }
 
-/// The column of a kind of effect with one parameter on a drive.
+/// The column of an effect kind with one parameter on a drive, counted among the unknown base parameters.
 fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
     let mechanism = &model.derivation.mechanism;
+    // The place is the drive, or the joint on which it acts.
     let is_here = |place: &EffectPlace| match (place, mechanism.drives[drive].kind) {
         (EffectPlace::Drive(d), _) => d.0 == drive,
         (EffectPlace::Coordinate(a), DriveKind::Joint(b)) => *a == b,
@@ -374,8 +389,8 @@ fn column_of(model: &Model, drive: usize, kind: &str) -> Option<usize> {
     unknown.position(|k| infos[k].expression == *name)
 }
 
-/// The centre of a body whose first four values are mass and first moments: first moment over mass, with the deviations of both
-/// and what they share; `None` for directions that are not told.
+/// The centre of a body whose first four values are mass and first moments, m: first moment over mass, with the
+/// standard deviation from both and their covariance. `None` for directions that are not determined.
 pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
     let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
@@ -385,6 +400,7 @@ pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
         let mass = found.determined[0].then(|| estimate(0));
         let mass = mass.filter(|mass| mass.is_known())?;
         let value = found.values[i] / mass.value;
+        // Variance of a quotient to first order.
         let c = |a: usize, b: usize| found.covariance[(a, b)];
         let variance = c(i, i) - 2.0 * value * c(0, i) + value * value * c(0, 0);
         found.determined[i].then(|| ChangeEstimate {
@@ -394,7 +410,7 @@ pub(crate) fn centre(found: &JointValues) -> [Option<ChangeEstimate>; 3] {
     })
 }
 
-/// What a kind of change is called.
+/// The name of a kind of change, as a noun phrase.
 pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
     let drive = |d: &usize| model.drives()[*d].clone();
     match kind {
@@ -407,6 +423,7 @@ pub(crate) fn name(model: &Model, kind: &ChangeKind) -> String {
     }
 }
 
+/// The change as a clause, with its values.
 fn change_text(model: &Model, what: &PhysicalChange) -> String {
     let unit = |name: &str| {
         let at = model.drives().iter().position(|drive| drive == name);
@@ -419,9 +436,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             centre,
         } => {
             let Some(mass) = mass else {
-                return format!(
-                    "another load on {frame}; what it weighs is not told by this motion"
-                );
+                return format!("another load on {frame}; this motion does not determine its mass");
             };
             let more = if mass.value > 0.0 { "more" } else { "less" };
             let weighs = ChangeEstimate {
@@ -445,6 +460,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             viscous,
             parts,
         } => {
+            // Signs decide between the usual causes of more and of less friction.
             let part =
                 |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
             let total: f64 = parts.iter().flatten().sum();
@@ -464,7 +480,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             )
         }
         PhysicalChange::Offset { drive, force } => format!(
-            "a constant force of {} on {drive}: the zero of its sensor, or weight that this motion does not turn",
+            "a constant force of {} on {drive}: the zero of its sensor, or weight whose direction does not change in this motion",
             force.text(unit(drive))
         ),
         PhysicalChange::Scale { drive, factor } => format!(
@@ -472,7 +488,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             factor.text("")
         ),
         PhysicalChange::Clock { factor } => format!(
-            "the time base: this run was {} times as fast as its time stamps say",
+            "the time base: this run was {} times as fast as its time stamps state",
             factor.text("")
         ),
         PhysicalChange::ContactEvent {
@@ -486,7 +502,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
                 })
                 .collect();
             format!(
-                "a contact or a push from {} to {} s: {}; left out of what follows",
+                "a contact or a push from {} to {} s: {}; excluded from what follows",
                 significant(*from, 5),
                 significant(*to, 5),
                 drives.join(", ")
@@ -496,13 +512,14 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
             let is_angle = model.motions().iter().any(is_angle);
             format!(
-                "the zero of {coordinate}: it stands {} from where its encoder says",
+                "the zero of {coordinate}: the true position is {} from the encoder's",
                 shift.text(if is_angle { "rad" } else { "m" })
             )
         }
     }
 }
 
+/// A change with its sign.
 fn signed_text(estimate: ChangeEstimate) -> String {
     let sign = if estimate.value > 0.0 { "+" } else { "" };
     format!("{sign}{}", estimate.text(""))

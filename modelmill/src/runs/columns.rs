@@ -1,4 +1,4 @@
-//! The rows of a stretch: base columns, and those of everything that may have changed.
+//! The columns of a segment: those of the base parameters, and those of everything that may have changed.
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::ForceColumn;
@@ -11,20 +11,23 @@ use crate::regressors::regressor;
 use crate::runs::payload::PayloadColumns;
 use crate::stretch::RecordingSegment;
 
-/// The part by which a clock, and the rad or m by which an encoder is turned to see what that does.
+/// Step of the central differences: fraction of a clock's rate, or rad or m of an encoder's zero.
 const TURNED: f64 = 1e-3;
 
-/// The rows of one stretch, drive by drive.
+/// The rows of one segment, drive by drive.
 pub(crate) struct SegmentRows {
+    /// Columns in the order of [`RunColumnLayout`](crate::runs::layout::RunColumnLayout).
     columns: Vec<ForceColumn>,
-    /// Measured forces less those of known parameters, `[drive][sample]`.
+    /// Measured forces minus those of known parameters, `[drive][sample]`, N or N m.
     pub(crate) forces: Vec<Vec<f64>>,
-    /// Which of them count.
+    /// Whether each of them counts.
     counts: Vec<Vec<bool>>,
 }
 
 impl SegmentRows {
-    /// The base columns alone.
+    /// The columns of the unknown base parameters alone; the force of known ones is subtracted.
+    ///
+    /// Fails when a pose has no solution, or a force was not measured.
     pub(crate) fn base_columns(model: &Model, stretch: &RecordingSegment) -> Outcome<Self> {
         let base = regressor(
             &[(stretch, false)],
@@ -44,6 +47,7 @@ impl SegmentRows {
                 columns.push(column);
             }
         }
+        // Samples that do not count are zero on both sides of the equations.
         let counts = counts(stretch, &forces);
         for (force, counts) in forces.iter_mut().zip(&counts) {
             zero_uncounted(force, counts);
@@ -58,7 +62,10 @@ impl SegmentRows {
         })
     }
 
-    /// All columns; `values` are base parameters on which scales, clocks and encoders' zeros are built.
+    /// All columns. `values` are the base parameters with which the columns of scales, clocks and encoders' zeros
+    /// are computed.
+    ///
+    /// Fails as [`Self::base_columns`] does.
     pub(crate) fn all_columns(
         model: &Model,
         stretch: &RecordingSegment,
@@ -76,15 +83,17 @@ impl SegmentRows {
         Ok(laid)
     }
 
+    /// Number of decimated samples.
     pub(crate) fn samples(&self) -> usize {
         self.forces.first().map_or(0, Vec::len)
     }
 
+    /// A column on a drive; `None` if it is zero there.
     pub(crate) fn column(&self, k: usize, drive: usize) -> Option<&[f64]> {
         self.columns.get(k)?.0.get(drive)?.as_deref()
     }
 
-    /// What values of the first columns leave of a drive's force.
+    /// The residual of a drive's force for values of the first columns.
     pub(crate) fn residual(&self, drive: usize, values: &DVector<f64>) -> Vec<f64> {
         let mut rest = self.forces[drive].clone();
         for (k, value) in values.iter().enumerate() {
@@ -96,11 +105,12 @@ impl SegmentRows {
         rest
     }
 
-    /// Stretches of samples that count.
+    /// Ranges of consecutive samples that count.
     pub(crate) fn pieces(&self, drive: usize) -> Vec<std::ops::Range<usize>> {
         let counts = &self.counts[drive];
         let mut pieces = Vec::new();
         let mut start = 0;
+        // A sample that does not count ends a range.
         for end in 0..=counts.len() {
             if end == counts.len() || !counts[end] {
                 if end > start {
@@ -113,9 +123,10 @@ impl SegmentRows {
     }
 }
 
-/// Which forces count, `[drive][sample]`. A kept sample has heard of all that its filter saw.
+/// Whether each force counts, `[drive][sample]`. A decimated sample depends on all samples that its filter used.
 fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     let n = forces.len();
+    // Weights of zero exclude a sample, as at standstill.
     let weighs = |drive: usize, i: usize| {
         let weights = stretch.weights.as_ref();
         weights.is_none_or(|weights| weights[i * n + drive] > 0.0)
@@ -129,7 +140,7 @@ fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
     forces.iter().enumerate().map(of_drive).collect()
 }
 
-/// Ten columns for each body.
+/// The columns of payloads: ten for each body.
 fn payload_columns(
     model: &Model,
     stretch: &RecordingSegment,
@@ -141,13 +152,14 @@ fn payload_columns(
     Ok(payloads.columns.iter().flatten().map(of).collect())
 }
 
-/// Dry and viscous friction of each drive, then a constant force on each.
+/// Columns of dry and viscous friction of each drive, followed by a constant force on each.
 fn drive_columns(
     model: &Model,
     stretch: &RecordingSegment,
     samples: usize,
 ) -> Outcome<Vec<ForceColumn>> {
     let n = model.drives().len();
+    // Each of these columns acts on one drive.
     let only = |drive: usize, values: Vec<f64>| {
         let mut column = ForceColumn(vec![None; n]);
         column.0[drive] = Some(values);
@@ -155,6 +167,7 @@ fn drive_columns(
     };
     let mut columns = Vec::new();
     for (drive, rate) in along::drive_rates(model, stretch)?.into_iter().enumerate() {
+        // At exact standstill dry friction has no direction.
         let sign = |x: &f64| if *x == 0.0 { 0.0 } else { x.signum() };
         let signs = rate.iter().map(sign).collect();
         let both = filter_and_decimate(vec![signs, rate], stretch)?;
@@ -164,7 +177,7 @@ fn drive_columns(
     Ok(columns)
 }
 
-/// Puts 0 where a sample does not count.
+/// Sets values to 0 where a sample does not count.
 fn zero_uncounted(values: &mut [f64], counts: &[bool]) {
     for (value, _) in values
         .iter_mut()
@@ -175,7 +188,7 @@ fn zero_uncounted(values: &mut [f64], counts: &[bool]) {
     }
 }
 
-/// A column without the samples that do not count.
+/// Sets a column to 0 where a sample does not count.
 fn clear_uncounted(column: &mut ForceColumn, counts: &[Vec<bool>]) {
     for (values, counts) in column.0.iter_mut().zip(counts) {
         if let Some(values) = values {
@@ -184,8 +197,8 @@ fn clear_uncounted(column: &mut ForceColumn, counts: &[Vec<bool>]) {
     }
 }
 
-/// Columns that are built on predicted forces: a scale of each drive; a clock that runs by a part slower, so that rates and
-/// accelerations come out larger by once and twice that part; and each encoder with another zero.
+/// Columns that are computed from predicted forces: a scale of each drive; a clock that is slow by a fraction, so
+/// that rates and accelerations become larger by once and twice that fraction; and another zero of each encoder.
 fn prediction_columns(
     model: &Model,
     stretch: &RecordingSegment,
@@ -194,13 +207,16 @@ fn prediction_columns(
 ) -> Outcome<Vec<ForceColumn>> {
     let n = laid.forces.len();
     let mut columns = Vec::new();
+    // The column of a scale is the predicted force itself.
     for drive in 0..n {
+        // Measured force minus residual is the prediction.
         let rest = laid.residual(drive, values);
         let mut column = ForceColumn(vec![None; n]);
         let pairs = laid.forces[drive].iter().zip(&rest);
         column.0[drive] = Some(pairs.map(|(y, r)| y - r).collect());
         columns.push(column);
     }
+    // Known and unknown base parameters are joined in the order of the model.
     let mut next = values.iter();
     let all: Vec<f64> = (0..model.base.len())
         .map(|k| {
@@ -214,8 +230,9 @@ fn prediction_columns(
     let forces = |turned: &RecordingSegment| {
         along::forces(model, turned, &all).and_then(|forces| filter_and_decimate(forces, stretch))
     };
-    // Central differences.
+    // The derivative of the predicted forces, by central differences.
     let slope = |turn: &dyn Fn(&mut RecordingSegment, f64)| -> Outcome<ForceColumn> {
+        // The model is evaluated with the motion changed in either direction.
         let [ahead, back] = [TURNED, -TURNED].map(|by| {
             let mut turned = stretch.clone();
             turn(&mut turned, by);
@@ -235,10 +252,12 @@ fn prediction_columns(
             *x *= factor;
         }
     };
+    // Clock: rates scale once, accelerations twice.
     columns.push(slope(&|turned, part| {
         scaled(&mut turned.run.qd, 1.0 + part);
         scaled(&mut turned.run.qdd, (1.0 + part).powi(2));
     })?);
+    // Zeros: positions are shifted, one coordinate after the other.
     for coordinate in 0..stretch.run.q.len() {
         columns.push(slope(&|turned, by| {
             for q in &mut turned.run.q[coordinate] {

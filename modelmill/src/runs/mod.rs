@@ -1,9 +1,10 @@
-//! `runs`: what is different between recordings of one machine.
+//! `runs`: reports changes between recordings of one machine.
 //!
-//! Each run is fitted alone and all are fitted together. Every run after the first is then held against the first: which
-//! changes, said in physics, explain what the two do not share. Possible are another load on any body, other friction of a
-//! drive, an offset or another scale of its force, and another clock. Payloads are columns of their own, ten for each body,
-//! derived from the model with such a body besides, so that they need no parameter of the model file.
+//! Each run is fitted alone, and all runs are fitted together. Every later run is compared with the first: physical
+//! changes are searched that explain what the two do not share. Possible changes are another load on any body,
+//! other friction of a drive, an offset or another scale of its force, another clock, and other zeros of encoders.
+//! Payloads have columns of their own, ten for each body, derived from the model with such a body added, so that
+//! the model file needs no parameters for them.
 
 mod changes;
 mod columns;
@@ -39,69 +40,70 @@ pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
 
-/// A difference of a base parameter counts as moved from this many standard deviations on.
+/// A base parameter has changed if its difference exceeds this many standard deviations.
 const MOVED: f64 = 4.0;
 
-/// A change must move one of the drives by this part of its effective force: less is within what no model knows.
+/// A change must move one of the drives by this fraction of its rms force: smaller changes are within the errors of
+/// any model.
 const LEAST: f64 = 4e-3;
 
-/// What is shorter, in s, is left out but not told as a push: the error of a model rises for so long as well.
+/// Shorter events, in s, are excluded but not reported as pushes: model errors can rise for so long as well.
 const SHORTEST_PUSH: f64 = 0.25;
 
-/// Before and after an event so much of its length is left out as well.
+/// This fraction of an event's length is excluded before and after it as well.
 const AROUND: f64 = 0.2;
 
-/// A value with its standard deviation.
+/// A fitted value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedValue {
     /// The value, in the unit of the parameter.
     pub value: f64,
-    /// Its standard deviation; `None` where the run does not determine the parameter.
+    /// Its standard deviation, in the same unit; `None` if the run does not determine the parameter.
     pub deviation: Option<f64>,
 }
 
 impl FittedValue {
-    /// The standard deviation of its difference from another one.
+    /// The standard deviation of its difference from another value.
     pub fn difference_deviation(self, other: Self) -> f64 {
         let [a, b] = [self, other].map(|one| one.deviation.unwrap_or(0.0));
         a.hypot(b)
     }
 }
 
-/// One run.
+/// The result of one run.
 #[derive(Clone, Debug)]
 pub struct RunReport {
-    /// What messages call its recording.
+    /// Name of its recording in messages.
     pub file: String,
-    /// Samples that were used.
+    /// Number of samples that were used, after decimation.
     pub samples: usize,
     /// Base parameters fitted to this run alone.
     pub alone: Vec<FittedValue>,
-    /// Base parameters, by position, that differ from those of the first run by more than four deviations.
+    /// Indices of base parameters that differ from those of the first run by more than four standard deviations.
     pub moved: Vec<usize>,
-    /// What changed against the first run, the largest first, and events within this run.
+    /// Changes relative to the first run, the largest first, and events within this run.
     pub changes: Vec<RunChange>,
 }
 
-/// A run that gave no answer.
+/// A run without a result.
 #[derive(Debug)]
 pub struct UnreadRun {
-    /// What messages call its recording.
+    /// Name of its recording in messages.
     pub file: String,
-    /// Why.
+    /// The reason.
     pub error: Error,
 }
 
-/// What is asked of runs beside what changed.
+/// Requests in addition to the search of changes.
 #[derive(Clone, Debug, Default)]
 pub struct RunsOptions {
-    /// What each run has of its own in one fit of all runs; no such fit without any.
+    /// Values that each run has separately in one fit of all runs; without any there is no such fit.
     pub per_run: Vec<PerRunSelection>,
-    /// Loads of known mass, from which the scales of all measured forces follow.
+    /// Loads of known mass, which determine the scales of all measured forces.
     pub loads: Vec<KnownLoad>,
 }
 
-/// What differs between runs.
+/// The comparison of runs.
 pub struct RunsComparison {
     /// Name of the model.
     pub model: String,
@@ -109,31 +111,49 @@ pub struct RunsComparison {
     pub parameters: Vec<ParameterInfo>,
     /// Base parameters fitted to all runs at once.
     pub together: Vec<FittedValue>,
-    /// All runs that gave an answer; the first is the one that the others are held against.
+    /// All runs with a result; the first is the reference of the others.
     pub runs: Vec<RunReport>,
-    /// Runs that gave none.
+    /// Runs without a result.
     pub unread: Vec<UnreadRun>,
-    /// When parameters changed and stayed changed, in the order of the runs.
+    /// Runs from which on parameters have changed permanently, in the order of the runs.
     pub points: Vec<ChangePoint>,
-    /// The fit of all runs in which some values are each run's own, if one was asked for.
+    /// The fit of all runs with separate values for each run, if it was requested.
     pub shared: Option<SharedFit>,
-    /// Remarks on the recordings.
+    /// Notes on the recordings.
     pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// Holds runs of one machine against the first of them and says what changed.
+    /// Compares runs of one machine with the first of them and reports changes.
     ///
-    /// The runs are taken one after the other and nothing is kept of them but sums, so that there may be hundreds. Runs that cannot
-    /// be read or prepared are named in the result.
+    /// The runs are processed one after the other, and only their sums are kept, so that there may be hundreds.
+    /// Runs that cannot be read or prepared are listed in the result.
     ///
-    /// Fails with fewer than two runs, where the first cannot be read or no later one can, where no force was measured, or where
-    /// `asked` names what the model does not have.
+    /// Fails with fewer than two runs, if the first or all later runs cannot be read, if no force was measured, or
+    /// if `asked` names something that the model does not have.
+    ///
+    /// ```no_run
+    /// use modelmill::Model;
+    /// use modelmill::recording::RecordingOptions;
+    /// use modelmill::runs::{RunsOptions, UnreadRun};
+    ///
+    /// let model = Model::open("arm.toml")?;
+    /// let runs = ["monday.csv", "tuesday.csv"].map(|file| {
+    ///     let read = model.recording(file, &RecordingOptions::default());
+    ///     read.map_err(|error| UnreadRun { file: file.to_owned(), error })
+    /// });
+    /// let compared = model.runs(runs, &RunsOptions::default())?;
+    /// for change in &compared.runs[1].changes {
+    ///     println!("{}", change.says);
+    /// }
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn runs<R: Borrow<PreparedRecording>>(
         &self,
         recordings: impl IntoIterator<Item = Result<R, UnreadRun>>,
         asked: &RunsOptions,
     ) -> Outcome<RunsComparison> {
+        // Columns and hypotheses are the same for all runs.
         let payloads = PayloadColumns::new(self)?;
         let bench = RunAnalyser::new(self, &payloads);
         let layout = bench.layout;
@@ -141,10 +161,12 @@ impl Model {
         let mut recordings = recordings.into_iter();
         let total = recordings.size_hint().0;
         self.host()
-            .run_job("holding runs against the first", total, |job| {
+            .run_job("comparing runs with the first", total, |job| {
                 let Some(first) = recordings.next() else {
                     return Err(Error::options("there is no recording; give two or more"));
                 };
+                // Stage 1: the first run is the reference. Its base parameters determine the columns of scales
+                // and clocks.
                 let first = first.map_err(|unread| unread.error)?;
                 let first = first.borrow();
                 let before = bench.analyse_run(first, None)?;
@@ -155,6 +177,7 @@ impl Model {
                 let mut unread = Vec::new();
                 shared.add_run(&before.file, &before.white);
                 job.step(1)?;
+                // Stage 2: each later run is compared with it.
                 for recording in recordings {
                     let looked_at = recording.and_then(|recording| {
                         let recording = recording.borrow();
@@ -180,9 +203,11 @@ impl Model {
                         Err(one) => unread.push(one),
                     }
                 }
+                // A comparison needs a second run.
                 if all.len() < 2 {
                     return Err(too_few_runs_error(&before.file, &unread));
                 }
+                // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
                 let base: Vec<usize> = (0..layout.base).collect();
                 let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
                 let points = points::find_change_points(
@@ -211,14 +236,14 @@ impl Model {
     }
 }
 
-/// There is nothing to hold the first run against.
+/// The error of a comparison without a second run.
 fn too_few_runs_error(first: &str, unread: &[UnreadRun]) -> Error {
     match unread {
         [] => Error::options(format!(
-            "{first} is the only recording; what changed is told between two or more, the first of which is how things were"
+            "{first} is the only recording; `runs` compares two or more recordings, the first of which is the reference"
         )),
         [one, ..] => Error::input(message!(
-            "no recording but {first} gave an answer; {} of {} did not, as {}: {}",
+            "no recording except {first} could be analysed; {} of {} failed, such as {}: {}",
             unread.len(),
             unread.len() + 1,
             one.file,
@@ -227,30 +252,39 @@ fn too_few_runs_error(first: &str, unread: &[UnreadRun]) -> Error {
     }
 }
 
-/// What all runs are looked at with.
+/// Everything that the analysis of all runs shares.
 pub(crate) struct RunAnalyser<'a> {
+    /// The model.
     model: &'a Model,
+    /// Columns of loads.
     payloads: &'a PayloadColumns,
+    /// Order of the columns.
     layout: RunColumnLayout,
+    /// All hypotheses, in the order of the search.
     possible: Vec<ChangeHypothesis>,
+    /// The hypotheses as the search needs them.
     search: ChangeHypotheses,
 }
 
-/// One run as sums.
+/// One run as additive statistics.
 pub(crate) struct RunStatistics {
+    /// Name of the recording in messages.
     file: String,
+    /// Number of samples, after decimation.
     samples: usize,
+    /// Contacts and pushes in the run.
     pub(crate) events: Vec<RunChange>,
     /// Base parameters of the first run.
     values: DVector<f64>,
+    /// Sums over white rows.
     white: WhitenedRun,
-    /// By what its parts differ among themselves.
+    /// Difference between the parts of the run, the scale of what is no change.
     within: f64,
-    /// Its rows as they were measured.
+    /// Sums over the rows as measured.
     sizes: MeasuredMoments,
 }
 
-/// Events of forces that were measured; those that follow each other at once are one.
+/// Events of measured forces; events that follow each other at once are merged.
 fn merged_contact_events(
     events: Vec<ContactEvent>,
     stretch: &RecordingSegment,
@@ -280,7 +314,7 @@ fn merged_contact_events(
     all
 }
 
-/// Whether most forces of a drive between two times were measured: what stands in the place of others is no push.
+/// Whether most forces of a drive between two times were measured; replaced values are no push.
 fn is_measured(stretch: &RecordingSegment, drive: usize, from: f64, to: f64) -> bool {
     let Some(out) = stretch.run.left_out.get(drive) else {
         return true;
@@ -296,6 +330,7 @@ fn is_measured(stretch: &RecordingSegment, drive: usize, from: f64, to: f64) -> 
 }
 
 impl<'a> RunAnalyser<'a> {
+    /// Prepares the columns and hypotheses.
     fn new(model: &'a Model, payloads: &'a PayloadColumns) -> Self {
         let layout = RunColumnLayout::new(model, payloads);
         let possible = changes::possible_changes(model, payloads, layout);
@@ -312,6 +347,8 @@ impl<'a> RunAnalyser<'a> {
         }
     }
 
+    /// The sums of a run, without its contacts and pushes. `values` are the base parameters of the first run,
+    /// `None` for the first run itself.
     fn analyse_run(
         &self,
         recording: &PreparedRecording,
@@ -322,7 +359,7 @@ impl<'a> RunAnalyser<'a> {
         for stretch in &mut stretches {
             let found = events::events(self.model, stretch).unwrap_or_default();
             let found = merged_contact_events(found, stretch);
-            // The beginning and the end of a push hardly rise above what is usual.
+            // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
             let wide = found.iter().map(|event| {
                 let room = AROUND * (event.to - event.from);
                 ContactEvent {
@@ -332,6 +369,7 @@ impl<'a> RunAnalyser<'a> {
                 }
             });
             events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
+            // Short events are excluded, but not reported.
             let lasting = found
                 .iter()
                 .filter(|event| event.to - event.from >= SHORTEST_PUSH);
@@ -353,13 +391,14 @@ impl<'a> RunAnalyser<'a> {
         })
     }
 
-    /// A run fitted alone.
+    /// The report of a run fitted alone: values, changed parameters and events. `before` is the first run.
     fn run_report(&self, run: &RunStatistics, before: &RunStatistics) -> RunReport {
         let base: Vec<usize> = (0..self.layout.base).collect();
         let of = |run: &RunStatistics| {
             fit_parameters(self.model, &run.white.total().select_columns(&base))
         };
         let (alone, reference) = (of(run), of(before));
+        // Only parameters that both runs determine can be compared.
         let differs = |(a, b): (&FittedValue, &FittedValue)| {
             let is_known = a.deviation.is_some() && b.deviation.is_some();
             is_known && (a.value - b.value).abs() > MOVED * a.difference_deviation(*b)
@@ -378,11 +417,12 @@ impl<'a> RunAnalyser<'a> {
         }
     }
 
-    /// What changed in a run, the largest first; what hardly moves any drive is left out.
+    /// Changes of a run relative to the first, the largest first; those that hardly move any drive are left out.
     fn changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<RunChange> {
         self.identified_changes(&self.find_changes(before, run), &before.values)
     }
 
+    /// The same before they are described.
     fn find_changes(&self, before: &RunStatistics, run: &RunStatistics) -> Vec<SelectedChange> {
         let runs = RunPair {
             reference: before.white.blocks.clone(),
@@ -392,7 +432,7 @@ impl<'a> RunAnalyser<'a> {
         self.significant_changes(&runs, &run.sizes)
     }
 
-    /// What a search finds, without what hardly moves any drive.
+    /// Changes that a search finds, without those that hardly move any drive.
     fn significant_changes(&self, runs: &RunPair, sizes: &MeasuredMoments) -> Vec<SelectedChange> {
         let mut found = search_changes(runs, &self.search);
         found.retain(|one| {
@@ -402,6 +442,7 @@ impl<'a> RunAnalyser<'a> {
         found
     }
 
+    /// Changes with their physical values and texts.
     fn identified_changes(
         &self,
         found: &[SelectedChange],
@@ -413,19 +454,19 @@ impl<'a> RunAnalyser<'a> {
     }
 }
 
-/// A change between two recordings, with the force that it is.
+/// A change between two recordings, with its force.
 pub(crate) struct RecordingDifference {
-    /// The recording before.
+    /// The recording of the reference.
     pub(crate) first: String,
     /// The later one.
     pub(crate) later: String,
-    /// What changed.
+    /// The change.
     pub(crate) changed: RunChange,
-    /// What the forces of the later one have besides, along all recordings.
+    /// The force of the change along all recordings, zero except in the later one.
     pub(crate) force: ForceColumn,
 }
 
-/// What later recordings do not share with the first, with the forces that that makes.
+/// Changes of later recordings relative to the first, with the forces that they cause.
 pub(crate) fn differences(
     model: &Model,
     recordings: &[&PreparedRecording],
@@ -436,6 +477,7 @@ pub(crate) fn differences(
     let payloads = PayloadColumns::new(model)?;
     let bench = RunAnalyser::new(model, &payloads);
     let before = bench.analyse_run(first, None)?;
+    // Forces are placed within the samples of all recordings.
     let samples = |one: &PreparedRecording| -> usize {
         one.segments.iter().map(|one| one.time().len()).sum()
     };
@@ -483,9 +525,10 @@ pub(crate) fn differences(
     Ok(differences)
 }
 
-/// The base parameters that some rows of variance 1 give; those that are numbers of the file keep them.
+/// Base parameters from normal equations of rows with variance 1; parameters known from the file keep their values.
 fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> {
     let solved = moments.solve();
+    // If the rows scatter more than assumed, the standard deviations grow accordingly.
     let noise =
         (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
     merge_known(model, |i| FittedValue {
@@ -494,7 +537,8 @@ fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> 
     })
 }
 
-/// All base parameters, of which those that are no numbers of the file are asked for by their place among themselves.
+/// All base parameters in the order of the model; `unknown` gives those that are not known, by their index among
+/// themselves.
 fn merge_known(model: &Model, unknown: impl Fn(usize) -> FittedValue) -> Vec<FittedValue> {
     let mut next = 0;
     let of = |k: usize| {

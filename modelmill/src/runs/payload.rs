@@ -1,5 +1,5 @@
-//! What a further body on each body of a mechanism adds to the forces: ten columns for each, linear in its mass, first moments
-//! and inertia about the frame's origin.
+//! Columns of loads: the force of a further body on each body of a mechanism, ten columns each, linear in its mass,
+//! first moments and inertia about the frame's origin.
 
 use modelmill_codegen::{Derivation, derive_columns};
 use modelmill_spec::{
@@ -10,22 +10,24 @@ use modelmill_spec::{
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-/// Parameters of a body: mass, first moments x, y, z, and inertia xx, xy, xz, yy, yz, zz.
+/// Number of parameters of a body: mass, first moments x, y, z, and inertia xx, xy, xz, yy, yz, zz.
 pub(crate) const TEN: usize = 10;
 
-/// Columns of further bodies.
+/// Columns of loads on all bodies.
 pub(crate) struct PayloadColumns {
-    /// Frames that carry them, one after the other.
+    /// Names of the frames that may carry a load, one after the other.
     pub(crate) frames: Vec<String>,
-    /// For each frame the columns of the derivation that are those of its ten parameters; `None` where one has no effect.
+    /// For each frame, the columns of the derivation that belong to its ten parameters; `None` if a parameter has
+    /// no effect.
     pub(crate) columns: Vec<[Option<usize>; TEN]>,
-    /// H for these parameters alone.
+    /// The derivation of H for these parameters alone.
     pub(crate) derivation: Derivation,
 }
 
 impl PayloadColumns {
-    /// Of all frames that carry parts or lumped masses.
+    /// The columns for all frames that carry parts or lumped masses.
     pub(crate) fn new(model: &Model) -> Outcome<Self> {
+        // The base frame has the index 0 and cannot carry a load.
         let mechanism = &model.derivation.mechanism;
         let mut frames: Vec<FrameIdx> = Vec::new();
         let parts = mechanism.parts.iter().map(|part| part.frame);
@@ -36,10 +38,12 @@ impl PayloadColumns {
         }
         frames.sort_by_key(|frame| frame.0);
         let (variant, own) = with_bodies(mechanism, &frames);
+        // Only products of a single new parameter are derived.
         let is_wanted = |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
         let derivation = derive_columns(&variant, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         let reduction = &derivation.reduction;
+        // Parameters without effect on the drives have no column.
         let products: Vec<usize> = reduction
             .retained
             .iter()
@@ -59,7 +63,7 @@ impl PayloadColumns {
     }
 }
 
-/// The mechanism with a further body on each of some frames, and where the parameters of these bodies begin.
+/// The mechanism with a further body on each of some frames, and the index of the first of their parameters.
 fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize) {
     let mut variant = mechanism.clone();
     let own = variant.parameters.len();
@@ -76,6 +80,7 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
                 inertia: std::array::from_fn(|i| value(4 + i)),
             },
         });
+        // Nominal values are 0: only the columns are used.
         for i in 0..TEN {
             let unit = match i {
                 0 => "kg",

@@ -1,5 +1,5 @@
-//! One fit of all runs in which base parameters are shared and what is named is each run's own, and the scales of measured forces
-//! from a load of known mass.
+//! One fit of all runs in which base parameters are shared and requested values are separate for each run. Loads of
+//! known mass determine the scales of measured forces.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -14,9 +14,9 @@ use crate::runs::payload::{PayloadColumns, TEN};
 use crate::runs::rows::WhitenedRun;
 use crate::runs::{ChangeEstimate, FittedValue, centre};
 
-/// Kinds of values that a run may have of its own.
+/// Kinds of values that may be separate for each run.
 const KINDS: [&str; 6] = ["payload", "friction", "offset", "gain", "clock", "zero"];
-/// What a body's ten parameters are called, with their units.
+/// Names and units of a body's ten parameters.
 const BODY_PARAMETERS: [(&str, &str); TEN] = [
     ("mass", "kg"),
     ("mx", "kg m"),
@@ -30,30 +30,40 @@ const BODY_PARAMETERS: [(&str, &str); TEN] = [
     ("zz", "kg m^2"),
 ];
 
-/// Values that each run has of its own: a kind, and where.
+/// Values that are separate for each run: a kind, and optionally a place.
+///
+/// ```
+/// use modelmill::runs::PerRunSelection;
+///
+/// assert!(PerRunSelection::parse("payload@flange").is_ok());
+/// assert!(PerRunSelection::parse("payload").is_err());
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PerRunSelection {
+    /// One of [`KINDS`], or the name of a base parameter.
     what: String,
+    /// Frame, drive or coordinate; `None` selects all places of the kind.
     at: Option<String>,
 }
 
 impl PerRunSelection {
-    /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`, `zero`,
-    /// `zero@COORDINATE`, or the name of a base parameter.
+    /// Reads `payload@FRAME`, `friction`, `friction@DRIVE`, `offset`, `offset@DRIVE`, `gain`, `gain@DRIVE`, `clock`,
+    /// `zero`, `zero@COORDINATE`, or the name of a base parameter.
     ///
-    /// Fails with what is expected.
+    /// Fails with the expected form, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let (what, at) = match text.split_once('@') {
             Some((what, at)) => (what.trim(), Some(at.trim())),
             None => (text.trim(), None),
         };
+        // What is no kind may be the name of a base parameter, which is checked with the model.
         let is_kind = KINDS.contains(&what);
         let says = if what.is_empty() || at == Some("") {
             "a kind and a place are expected, such as `payload@flange` or `friction`"
         } else if what == "payload" && at.is_none() {
             "a payload needs its body, as in `payload@flange`"
         } else if what == "clock" && at.is_some() {
-            "a run has one clock; write `clock`"
+            "a run has one clock; use `clock` without a place"
         } else if !is_kind && at.is_some() {
             "kinds are payload, friction, offset, gain, clock, zero"
         } else {
@@ -67,11 +77,18 @@ impl PerRunSelection {
 }
 
 /// A load of known mass on a body in one of the runs.
+///
+/// ```
+/// use modelmill::runs::KnownLoad;
+///
+/// let load = KnownLoad::parse("with-tool.csv=2.8@flange").unwrap();
+/// assert_eq!((load.mass, load.frame.as_str()), (2.8, "flange"));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownLoad {
-    /// Which run: the end of its file's name.
+    /// The run: the end of its file name.
     pub run: String,
-    /// What the load weighs, kg.
+    /// Mass of the load, kg.
     pub mass: f64,
     /// The frame that carries it.
     pub frame: String,
@@ -80,7 +97,7 @@ pub struct KnownLoad {
 impl KnownLoad {
     /// Reads `RUN=MASS@FRAME`, such as `with-tool.csv=2.8@flange`.
     ///
-    /// Fails with what is expected.
+    /// Fails with the expected form, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let expected = || {
             format!(
@@ -101,57 +118,68 @@ impl KnownLoad {
     }
 }
 
-/// A value of one run.
+/// A separate value of one run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunValue {
-    /// What it belongs to, as it was asked for: `payload@flange`, `friction@joint1`.
+    /// The quantity, as it was requested: `payload@flange`, `friction@joint1`.
     pub quantity: String,
-    /// Its name there.
+    /// Its symbol within the quantity.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Whether it is told against the first run, which has none of it, rather than as it is.
+    /// Whether the value is relative to the first run, where it is zero, and not absolute.
     pub is_against_first: bool,
     /// The value.
     pub value: FittedValue,
 }
 
-/// All runs in one fit.
+/// The fit of all runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SharedFit {
-    /// Shared base parameters, by position; `None` for those that are each run's own.
+    /// Shared base parameters, by index; `None` for those that are separate for each run.
     pub shared: Vec<Option<FittedValue>>,
-    /// By which factor each drive's measured force becomes the true one, where a known load tells.
+    /// The factor by which each drive's measured force becomes the true one, if a known load determines it.
     pub gains: Vec<(String, FittedValue)>,
-    /// The runs, each with its own values.
+    /// The runs, each with its separate values.
     pub runs: Vec<(String, Vec<RunValue>)>,
 }
 
-/// Columns that belong to one thing that was asked for.
+/// Columns of one requested quantity.
 struct PerRunColumns {
+    /// Its name, as in [`RunValue::quantity`].
     quantity: String,
+    /// Indices of its columns.
     columns: Vec<usize>,
-    /// Names and units of the values.
+    /// Symbols and units of the values.
     names: Vec<(String, String)>,
+    /// Whether the first run has none of it.
     is_against_first: bool,
-    /// What stands for no change: 1 for factors.
+    /// Value without a change: 1 for factors, else 0.
     origin: f64,
 }
 
-/// A fit that gathers its runs.
+/// Collects the runs of the fit.
 pub(crate) struct SharedFitBuilder<'a> {
+    /// The model.
     model: &'a Model,
+    /// Order of the columns.
     layout: RunColumnLayout,
+    /// Columns that are separate for each run.
     own: Vec<PerRunColumns>,
+    /// Loads of known mass.
     loads: &'a [KnownLoad],
     /// First column of each load's body.
     loaded: Vec<usize>,
-    /// Columns that are used at all.
+    /// Columns that the fit uses, ascending.
     used: Vec<usize>,
+    /// File name and sums of each run: one for each drive if there are loads, else one.
     runs: Vec<(String, Vec<modelmill_identify::changes::NormalEquations>)>,
 }
 
 impl<'a> SharedFitBuilder<'a> {
+    /// An empty fit for the requests.
+    ///
+    /// Fails when a request names something that the model does not have.
     pub(crate) fn new(
         model: &'a Model,
         payloads: &PayloadColumns,
@@ -160,6 +188,7 @@ impl<'a> SharedFitBuilder<'a> {
     ) -> Outcome<Self> {
         let infos = model.parameter_infos();
         let mut own: Vec<PerRunColumns> = Vec::new();
+        // Two requests of the same columns count once.
         for one in &asked.per_run {
             for further in per_run_columns(model, payloads, layout, &infos, one)? {
                 if own.iter().all(|other| other.columns != further.columns) {
@@ -171,6 +200,7 @@ impl<'a> SharedFitBuilder<'a> {
             .map(|load| Ok(layout.payload(frame(payloads, &load.frame)?)))
             .collect();
         let loaded = loaded?;
+        // Of all possible changes, only the requested columns are kept.
         let of_base = 0..layout.base;
         let mut used: Vec<usize> = of_base
             .chain(own.iter().flat_map(|one| one.columns.iter().copied()))
@@ -189,15 +219,17 @@ impl<'a> SharedFitBuilder<'a> {
         })
     }
 
+    /// Whether a fit was requested.
     fn is_requested(&self) -> bool {
         !self.own.is_empty() || !self.loads.is_empty()
     }
 
-    /// Takes what the fit needs of a run.
+    /// Adds a run, by the sums of its used columns.
     pub(crate) fn add_run(&mut self, file: &str, white: &WhitenedRun) {
         if !self.is_requested() {
             return;
         }
+        // Scales of forces need the sums of each drive, otherwise their total suffices.
         let sums = if self.loads.is_empty() {
             vec![white.total().select_columns(&self.used)]
         } else {
@@ -210,11 +242,14 @@ impl<'a> SharedFitBuilder<'a> {
         self.runs.push((file.to_owned(), sums));
     }
 
+    /// The index of a column among the used ones.
     fn place(&self, column: usize) -> usize {
         self.used.partition_point(|other| *other < column)
     }
 
-    /// The fit; `None` if none was asked for.
+    /// The fit; `None` if none was requested.
+    ///
+    /// Fails when the name of a load's run is not unique.
     pub(crate) fn answer(self) -> Outcome<Option<SharedFit>> {
         if !self.is_requested() {
             return Ok(None);
@@ -225,6 +260,7 @@ impl<'a> SharedFitBuilder<'a> {
             .map(|load| self.run_of_load(load))
             .collect();
         let loads = loads?;
+        // Base parameters that are separate for each run are not shared.
         let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
         let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
         let shared: Vec<usize> = (0..self.layout.base)
@@ -239,9 +275,12 @@ impl<'a> SharedFitBuilder<'a> {
         Ok(Some(self.shared_fit(&found, &shared, &parts, &owns)))
     }
 
-    /// Which run carries a load.
+    /// The index of the run that carries a load.
+    ///
+    /// Fails when no run or several runs match its name.
     fn run_of_load(&self, load: &KnownLoad) -> Outcome<usize> {
         let names = self.runs.iter().enumerate();
+        // The name must be complete path components at the end of the file name.
         let found: Vec<usize> = names
             .filter(|(_, (file, _))| {
                 let before = file.strip_suffix(load.run.as_str());
@@ -252,7 +291,7 @@ impl<'a> SharedFitBuilder<'a> {
         match found[..] {
             [one] => Ok(one),
             _ => Err(Error::options(message!(
-                "`{}` of {} is the name of {} of the runs that were read; give the end of one file's name: {}",
+                "`{}` of {} matches {} of the runs; give the end of one file name: {}",
                 load.run,
                 Remedy::option(OptionName::Loads),
                 if found.is_empty() { "none" } else { "several" },
@@ -265,7 +304,7 @@ impl<'a> SharedFitBuilder<'a> {
         }
     }
 
-    /// What a run has of its own.
+    /// The separate columns of a run, with the known mass of its load.
     fn run_part(&self, r: usize, loads: &[usize]) -> (JointRun, Vec<&PerRunColumns>) {
         let owns: Vec<&PerRunColumns> = (self.own.iter())
             .filter(|one| r > 0 || !one.is_against_first)
@@ -276,7 +315,7 @@ impl<'a> SharedFitBuilder<'a> {
             .zip(loads)
             .filter(|(_, run)| **run == r)
         {
-            // The first of ten is the mass; where the centre is and how the load turns is not known.
+            // The first of the ten columns is the mass; centre and inertia of the load are unknown.
             known.push((self.place(*at), load.mass));
             let further = (*at + 1..*at + TEN).filter(|k| !own.contains(k));
             let further: Vec<usize> = further.collect();
@@ -292,6 +331,7 @@ impl<'a> SharedFitBuilder<'a> {
         (part, owns)
     }
 
+    /// The result, in the order of the model's base parameters.
     fn shared_fit(
         &self,
         found: &JointFit,
@@ -312,6 +352,7 @@ impl<'a> SharedFitBuilder<'a> {
                 Some(fitted_value(&found.shared, at))
             }
         };
+        // The fit has the scale of the measured force; its inverse corrects the force.
         let gain = |(d, drive): (usize, String)| {
             let scale = fitted_value(&found.shared, shared.len() + d);
             let value = scale.value.recip();
@@ -334,7 +375,7 @@ impl<'a> SharedFitBuilder<'a> {
         }
     }
 
-    /// Values of one thing in a run.
+    /// The values of one quantity in a run, with the centre of a load.
     fn values(&self, own: &PerRunColumns, part: &JointRun, values: &JointValues) -> Vec<RunValue> {
         let at = |column: &usize| {
             let place = self.place(*column);
@@ -355,6 +396,7 @@ impl<'a> SharedFitBuilder<'a> {
                 Some(valued(name, unit, one))
             })
             .collect();
+        // The centre needs mass and first moments in the fit.
         if let (TEN, Some(places)) = (
             own.columns.len(),
             places
@@ -382,6 +424,7 @@ impl<'a> SharedFitBuilder<'a> {
     }
 }
 
+/// The value at an index of the fit, with its standard deviation.
 fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
     let variance = values.covariance[(at, at)].max(0.0);
     FittedValue {
@@ -390,12 +433,15 @@ fn fitted_value(values: &JointValues, at: usize) -> FittedValue {
     }
 }
 
-/// Position of a frame among those that may carry a load.
+/// Index of a frame among those that may carry a load.
+///
+/// Fails when there is no such body; the message lists all.
 fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
     let at = payloads.frames.iter().position(|frame| frame == name);
     at.ok_or_else(|| unknown_name_error("body", name, &payloads.frames))
 }
 
+/// The error of an unknown name.
 fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
     Error::options(format!(
         "there is no {what} `{name}`; there are {}",
@@ -403,7 +449,9 @@ fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
     ))
 }
 
-/// The columns that something asked for has.
+/// The columns of a request, one entry for each of its places.
+///
+/// Fails when the kind or the place is unknown.
 fn per_run_columns(
     model: &Model,
     payloads: &PayloadColumns,
@@ -412,6 +460,7 @@ fn per_run_columns(
     asked: &PerRunSelection,
 ) -> Outcome<Vec<PerRunColumns>> {
     let PerRunSelection { what, at } = asked;
+    // Without a place, all places of the kind are used.
     let places = |what: &str, names: Vec<String>| match at {
         None => Ok((0..names.len()).collect::<Vec<usize>>()),
         Some(at) => match names.iter().position(|name| name == at) {
@@ -440,7 +489,7 @@ fn per_run_columns(
             .map(|d| {
                 let unit = model.force_unit(d);
                 let start = layout.friction(d);
-                // Friction that the model has is told as it is.
+                // Friction of the model is given as an absolute value.
                 let own = friction(model, d);
                 let (columns, is_against_first) = match own {
                     [Some(dry), Some(viscous)] => (vec![dry, viscous], false),
@@ -496,7 +545,9 @@ fn per_run_columns(
     })
 }
 
-/// A base parameter by its name.
+/// The column of an unknown base parameter with a name.
+///
+/// Fails when there is no such parameter, or when its value is known.
 fn base_parameter(
     model: &Model,
     payloads: &PayloadColumns,

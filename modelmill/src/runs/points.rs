@@ -1,4 +1,4 @@
-//! When parameters changed and stayed changed, over the order of the runs, and what that is in physics.
+//! Permanent changes of parameters over the order of the runs, and their physical meaning.
 
 use modelmill_identify::changes::{
     NormalEquations, RunPair, UncertainValue, change_points, weighted_mean,
@@ -9,36 +9,37 @@ use nalgebra::DVector;
 use crate::runs::rows::MeasuredMoments;
 use crate::runs::{FittedValue, RunAnalyser, RunChange};
 
-/// A change of one parameter from one stretch of runs to the next.
+/// A permanent change of one parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterStep {
-    /// Which base parameter.
+    /// Index of the base parameter.
     pub parameter: usize,
-    /// Its mean over the runs since the change before.
+    /// Its mean over the runs since the previous change.
     pub before: FittedValue,
-    /// Its mean over the runs until the next.
+    /// Its mean over the runs until the next change.
     pub now: FittedValue,
 }
 
 impl ParameterStep {
+    /// The size of the step in its standard deviations.
     fn deviations(&self) -> f64 {
         (self.now.value - self.before.value).abs() / self.before.difference_deviation(self.now)
     }
 }
 
-/// A run from which on something was different and stayed so.
+/// A run from which on something has changed permanently.
 #[derive(Clone, Debug)]
 pub struct ChangePoint {
-    /// The first run after the change.
+    /// Index of the first run after the change.
     pub run: usize,
     /// Parameters that changed there, the clearest first.
     pub steps: Vec<ParameterStep>,
-    /// What it is: the runs since the change before, held against those until the next.
+    /// The physical changes: the runs since the previous change point, compared with those until the next.
     pub changes: Vec<RunChange>,
 }
 
-/// Change points over the runs; `runs` are the base parameters of each, fitted alone, `wholes` their sums and `within` by what
-/// parts of each differ among themselves. `sizes` and `values` are those of a run that the others are held against.
+/// Change points over the runs. `runs` are the base parameters of each run fitted alone, `wholes` their sums, and
+/// `within` the differences between the parts of each. `sizes` and `values` are those of the reference run.
 pub(crate) fn find_change_points(
     bench: &RunAnalyser<'_>,
     runs: &[&[FittedValue]],
@@ -50,6 +51,7 @@ pub(crate) fn find_change_points(
     let parameters: Vec<usize> = (0..bench.model.base.len())
         .filter(|k| !bench.model.is_known(*k))
         .collect();
+    // Stage 1: steps of each parameter over the order of the runs.
     let mut steps: Vec<(usize, ParameterStep)> = Vec::new();
     for parameter in &parameters {
         let told: Vec<Option<UncertainValue>> = runs
@@ -78,8 +80,10 @@ pub(crate) fn find_change_points(
             }
         }
     }
+    // Stage 2: steps of neighbouring runs belong to one change point.
     let starts = step_runs(&steps);
     let bounds: Vec<usize> = [0].into_iter().chain(starts).chain([runs.len()]).collect();
+    // Stage 3: the sums before and after each point are searched for physical changes.
     let point = |three: &[usize]| {
         let (start, at, end) = (three[0], three[1], three[2]);
         let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= 1);
@@ -99,12 +103,13 @@ pub(crate) fn find_change_points(
     bounds.windows(3).map(point).collect()
 }
 
+/// The value with its standard deviation, if the run determines it.
 fn known_value(fitted: FittedValue) -> Option<UncertainValue> {
     Some((fitted.value, fitted.deviation.filter(|d| *d > 0.0)?))
 }
 
-/// Runs at which steps begin; of neighbours the one with the clearest steps, since a parameter that is known badly in one run may
-/// be seen to change one run later.
+/// Indices of runs at which steps begin. Of neighbouring runs the one with the clearest steps is taken, since a
+/// parameter with a large uncertainty in one run may show its change one run later.
 fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     let mut weights: Vec<(usize, f64)> = Vec::new();
     for (run, step) in steps {
@@ -125,6 +130,7 @@ fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     kept
 }
 
+/// The median of some values; 0 without values.
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

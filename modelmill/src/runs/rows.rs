@@ -1,5 +1,5 @@
-//! A run as sums over its rows. Rows are laid out piece by piece, so that however long a run is, no more of it is held than its
-//! states and a piece of its columns.
+//! A run as sums over its rows. Rows are computed piece by piece, so that memory is needed only for its states and
+//! for one piece of its columns.
 
 use std::ops::Range;
 
@@ -14,41 +14,45 @@ use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
 use crate::stretch::RecordingSegment;
 
-/// Blocks of a run that decide for each other.
+/// Number of blocks of a run for cross-validation.
 pub(crate) const BLOCKS: usize = 8;
-/// Rounds of weighing the drives by what is left.
+/// Number of iterations of the weights from residuals.
 const ROUNDS: usize = 2;
-/// Noise that every run is taken to have besides, as a part of a drive's effective force: no model is better.
+/// Assumed additional noise of every run, relative to a drive's rms force: no model is more accurate.
 const FLOOR: f64 = 1e-3;
-/// The most samples of a piece, after decimation.
+/// Largest number of samples of a piece, after decimation.
 const PIECE: usize = 4096;
-/// Runs of so many pieces keep their columns; those of longer ones are made anew for each look.
+/// Runs of up to this many pieces keep their columns; longer ones compute them again in each pass.
 const KEPT: usize = 2;
 
 /// The rows of one run.
 pub(crate) struct RunRows<'a> {
+    /// The model.
     model: &'a Model,
+    /// Columns of loads.
     payloads: &'a PayloadColumns,
+    /// The segments in pieces.
     pieces: Vec<RecordingSegment>,
+    /// Columns of all pieces, if they are kept.
     kept: Option<Vec<SegmentRows>>,
-    /// Base parameters on which scales and clocks are built: those of the first run.
+    /// Base parameters with which the columns of scales and clocks are computed: those of the first run.
     pub(crate) values: DVector<f64>,
-    /// Sums over the rows of each drive as they were measured.
+    /// Sums over the rows of each drive as measured.
     sums: Vec<NormalEquations>,
 }
 
-/// A run whose rows are white: what it says.
+/// Sums over white rows of a run.
 pub(crate) struct WhitenedRun {
-    /// Block by block, all drives together.
+    /// Block by block, over all drives.
     pub(crate) blocks: Vec<NormalEquations>,
-    /// Drive by drive, the whole run.
+    /// Drive by drive, over the complete run.
     pub(crate) drives: Vec<NormalEquations>,
-    /// The base columns alone, all drives together: a triangle keeps the digits that sums of products lose.
+    /// The base columns alone, over all drives, as an R factor, which keeps the digits that sums of products lose.
     pub(crate) base: LeastSquares,
 }
 
 impl WhitenedRun {
-    /// The whole run.
+    /// Sums over the complete run.
     pub(crate) fn total(&self) -> NormalEquations {
         let mut whole = NormalEquations::new(self.blocks[0].rhs.len());
         for block in &self.blocks {
@@ -59,8 +63,10 @@ impl WhitenedRun {
 }
 
 impl<'a> RunRows<'a> {
-    /// The rows of stretches; `values` are base parameters of the run before, in whose place come those of this run where there
-    /// is none before.
+    /// The rows of segments. `values` are the base parameters of the first run; `None` for the first run, which
+    /// uses its own.
+    ///
+    /// Fails when a pose has no solution, a force was not measured, or values are too large for a fit.
     pub(crate) fn new(
         model: &'a Model,
         stretches: &[RecordingSegment],
@@ -71,6 +77,7 @@ impl<'a> RunRows<'a> {
         let pieces: Vec<RecordingSegment> = (stretches.iter())
             .flat_map(|stretch| stretch.pieces(PIECE))
             .collect();
+        // The first run is fitted with its base columns alone.
         let values = match values {
             Some(values) => values.clone(),
             None => {
@@ -93,6 +100,7 @@ impl<'a> RunRows<'a> {
             let laid = rows.pieces.iter().map(|piece| rows.segment_rows(piece));
             rows.kept = Some(laid.collect::<Outcome<_>>()?);
         }
+        // The sums over all columns need one pass over the pieces.
         let mut sums = vec![NormalEquations::new(layout.total()); layout.drives];
         rows.visit(|laid| {
             add_rows(&mut sums, laid);
@@ -102,11 +110,12 @@ impl<'a> RunRows<'a> {
         Ok(rows)
     }
 
+    /// All columns of a piece.
     fn segment_rows(&self, piece: &RecordingSegment) -> Outcome<SegmentRows> {
         SegmentRows::all_columns(self.model, piece, self.payloads, &self.values)
     }
 
-    /// Shows the columns, one piece after the other.
+    /// Calls `look` with the columns of each piece.
     fn visit(&self, mut look: impl FnMut(&SegmentRows) -> Outcome) -> Outcome {
         match &self.kept {
             Some(kept) => kept.iter().try_for_each(look),
@@ -114,12 +123,12 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// Sums over the rows as they were measured.
+    /// Sums over the rows as measured.
     pub(crate) fn sizes(self) -> MeasuredMoments {
         MeasuredMoments(self.sums)
     }
 
-    /// The force of some columns along the run, drive by drive.
+    /// The force of some columns along the run, drive by drive, N or N m.
     pub(crate) fn force(&self, columns: &[usize], values: &DVector<f64>) -> Outcome<Vec<Vec<f64>>> {
         let mut forces: Vec<Vec<f64>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
@@ -138,10 +147,13 @@ impl<'a> RunRows<'a> {
         Ok(forces)
     }
 
-    /// The rows with the memory of each drive's noise taken out, as sums.
+    /// Sums over the rows after a filter that whitens each drive's noise.
+    ///
+    /// Fails when values are too large for a fit.
     pub(crate) fn whitened_run(&self) -> Outcome<WhitenedRun> {
         let layout = RunColumnLayout::new(self.model, self.payloads);
         let columns = layout.total();
+        // Stage 1: the residual of each drive, in ranges without gaps.
         let values = weighted_least_squares(&self.sums)?;
         let mut rests: Vec<Vec<Vec<f64>>> = vec![Vec::new(); self.sums.len()];
         self.visit(|laid| {
@@ -155,6 +167,7 @@ impl<'a> RunRows<'a> {
             }
             Ok(())
         })?;
+        // Stage 2: an autoregressive model of each drive's residual.
         let noise = |(rests, sums): (&Vec<Vec<f64>>, &NormalEquations)| {
             let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
             AutoregressiveNoise::from_residual(&rests, FLOOR * effective_value(sums, sums.total))
@@ -163,6 +176,7 @@ impl<'a> RunRows<'a> {
         let length: usize = (self.pieces.iter())
             .map(|piece| piece.samples().div_ceil(piece.decimation()))
             .sum();
+        // Stage 3: sums over the filtered rows.
         let mut white = WhitenedRun {
             blocks: vec![NormalEquations::new(columns); BLOCKS],
             drives: vec![NormalEquations::new(columns); self.sums.len()],
@@ -176,12 +190,13 @@ impl<'a> RunRows<'a> {
                 .enumerate()
                 .filter(|(_, n)| n.standard_deviation > 0.0)
             {
+                // The filter restarts after each gap.
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
                     whiten(laid, drive, some, noise, columns, |i, z, y| {
                         let mut sums = NormalEquations::new(columns);
                         sums.add_rows(z, y);
-                        // Neighbouring blocks, each of the same part of the run.
+                        // Blocks are consecutive in time, the same part of the run for all drives.
                         let block = BLOCKS * (start + i) / length.max(1);
                         white.blocks[block.min(BLOCKS - 1)].merge(&sums);
                         white.drives[drive].merge(&sums);
@@ -205,12 +220,13 @@ impl<'a> RunRows<'a> {
     }
 }
 
-/// Sums over the rows of each drive as they were measured.
+/// Sums over the rows of each drive as measured.
 #[derive(Clone)]
 pub(crate) struct MeasuredMoments(pub(crate) Vec<NormalEquations>);
 
 impl MeasuredMoments {
-    /// What the best base parameters leave of the force of each drive, as a part of it: with `base` columns at the front.
+    /// The relative residual of each drive with the best base parameters; `base` is the number of base columns,
+    /// which come first.
     pub(crate) fn residual_ratios(&self, base: usize) -> Outcome<Vec<f64>> {
         let base: Vec<usize> = (0..base).collect();
         let sums: Vec<NormalEquations> =
@@ -226,7 +242,7 @@ impl MeasuredMoments {
         Ok(sums.iter().map(part).collect())
     }
 
-    /// How large the force of some columns is on the drive where it is largest, as a part of what that drive does.
+    /// The rms force of some columns relative to the drive's force, on the drive where this is largest.
     pub(crate) fn force_fraction(&self, columns: &[usize], values: &DVector<f64>) -> f64 {
         let of_drive = |sums: &NormalEquations| {
             let force = values.dot(&(sums.select_columns(columns).gram * values));
@@ -240,14 +256,16 @@ impl MeasuredMoments {
     }
 }
 
+/// The name of a drive.
 fn drive_name(model: &Model, drive: usize) -> String {
     model.drives()[drive].clone()
 }
 
-/// Rows that are shown at once.
+/// Number of rows that are processed at once.
 const TOGETHER: usize = 256;
 
-/// Shows white rows of a stretch of samples by their columns, some hundreds at a time, with the place of the first.
+/// Calls `show` with whitened rows of a range of samples, column by column, in groups of [`TOGETHER`] rows, with
+/// the index of the first.
 fn whiten(
     laid: &SegmentRows,
     drive: usize,
@@ -256,6 +274,7 @@ fn whiten(
     columns: usize,
     mut show: impl FnMut(usize, &[Option<&[f64]>], &[f64]) -> Outcome,
 ) -> Outcome {
+    // The same filter is applied to force and columns.
     let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
     let z: Vec<Option<Vec<f64>>> = (0..columns)
@@ -272,7 +291,7 @@ fn whiten(
     Ok(())
 }
 
-/// Adds the rows of a stretch to sums of each drive.
+/// Adds the rows of a segment to the sums of each drive.
 fn add_rows(sums: &mut [NormalEquations], laid: &SegmentRows) {
     for (drive, sums) in sums.iter_mut().enumerate() {
         let columns = 0..sums.rhs.len();
@@ -281,12 +300,12 @@ fn add_rows(sums: &mut [NormalEquations], laid: &SegmentRows) {
     }
 }
 
-/// Effective value of so large a sum of squares over the rows of a drive.
+/// The rms value over the rows of a drive, from a sum of squares.
 fn effective_value(sums: &NormalEquations, squares: f64) -> f64 {
     (squares / sums.rows.max(1) as f64).sqrt()
 }
 
-/// Least squares with every drive weighed by what is left on it.
+/// Least squares with each drive weighted by its residual.
 fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
     let mut deviations: Vec<f64> = sums
         .iter()
@@ -294,6 +313,7 @@ fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
         .collect();
     let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
     let mut values = DVector::zeros(0);
+    // Weights start from the forces and are then computed from the residuals.
     for _ in 0..=ROUNDS {
         let mut all = NormalEquations::new(sums.first().map_or(0, |one| one.rhs.len()));
         for (one, deviation) in sums.iter().zip(&deviations) {
@@ -304,7 +324,7 @@ fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
         values = all.solve().values;
         if values.iter().any(|x| !x.is_finite()) {
             return Err(Error::input(
-                "a run has numbers that are too large to be fitted; look at its units".to_owned(),
+                "a run has numbers that are too large for a fit; check its units".to_owned(),
             ));
         }
         let left = sums

@@ -1,5 +1,5 @@
-//! One stretch of a recording between gaps in time, ready for a model: shown block by block; faults name the time and the
-//! line of the recording.
+//! A segment of a recording without gaps in time, prepared for a model. States are visited block by block, and faults
+//! name the time and the line of the recording.
 
 pub mod variances;
 
@@ -13,29 +13,29 @@ use modelmill_identify::{PreparedRun, RecordingNote, sample_place_word};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
-/// States that are evaluated at once: progress moves on, and memory stays small.
+/// States that are evaluated at once: progress is reported after each block, and memory stays small.
 pub const BLOCK: usize = 4096;
 
-/// A stretch of a recording that is ready for a model.
+/// A segment of a recording, prepared for a model.
 #[derive(Clone)]
 pub struct RecordingSegment {
-    /// The states and forces.
+    /// States and forces, in SI units.
     pub run: PreparedRun,
-    /// Variances of the forces, `[drive][sample]`, where the recording has the columns `DRIVE_var`.
+    /// Variances of the forces, `[drive][sample]`, N^2 or (N m)^2, if the recording has the columns `DRIVE_var`.
     pub variance: Option<Vec<Vec<f64>>>,
-    /// What each equation counts beside the estimator's weights, interleaved per kept sample; all the same if there are
-    /// none.
+    /// Weights of the equations in addition to the estimator's, interleaved per sample after decimation; `None` if
+    /// all are equal.
     pub weights: Option<Vec<f64>>,
-    /// What the drives carry, `[drive][sample]`, for effects that depend on it; the measured forces if there are none.
+    /// Load of the drives, `[drive][sample]`, for effects that depend on it; `None` stands for the measured forces.
     pub load: Option<Vec<Vec<f64>>>,
-    /// The options that would read all angles in degrees; empty where no file stands behind.
+    /// The options that read all angles in degrees; empty if the segment was not read from a file.
     pub maps_from_degrees: Vec<OptionSetting>,
-    /// What is wrong with the recording, as far as it was seen.
+    /// Disturbances that were found in the recording.
     pub faults: Vec<Disturbance>,
 }
 
 impl From<PreparedRun> for RecordingSegment {
-    /// A run without variances whose equations count all the same.
+    /// A run without variances, with equal weights.
     fn from(run: PreparedRun) -> Self {
         Self {
             run,
@@ -49,25 +49,28 @@ impl From<PreparedRun> for RecordingSegment {
 }
 
 impl RecordingSegment {
-    /// Samples before decimation.
+    /// Number of samples before decimation.
     pub fn samples(&self) -> usize {
         self.run.samples()
     }
 
-    /// Every how many samples one is kept.
+    /// Factor of decimation, at least 1.
     pub fn decimation(&self) -> usize {
         self.run.prepared.decimate.max(1)
     }
 
-    /// The stretch in pieces of no more than so many kept samples, each of which stands alone.
+    /// The segment in pieces of at most `longest` decimated samples, each a segment of its own.
     pub(crate) fn pieces(&self, longest: usize) -> Vec<Self> {
         let every = self.decimation();
         let kept = self.samples().div_ceil(every);
         let n = kept.div_ceil(longest).max(1);
         let drives = self.run.force.as_ref().map_or(0, Vec::len);
         let piece = |k: usize| {
+            // Pieces start at samples that decimation keeps, and differ by at most one decimated
+            // sample.
             let [from, to] = [k, k + 1].map(|k| k * kept / n);
             let (start, end) = (every * from, (every * to).min(self.samples()));
+            // Weights belong to decimated samples, all other columns to recorded ones.
             let cut = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
             let run = &self.run;
             Self {
@@ -98,10 +101,11 @@ impl RecordingSegment {
         (0..n).map(piece).collect()
     }
 
-    /// Whether a kept sample has heard, through the filter before it, of a force of a drive that does not count.
+    /// Whether the filter before a decimated sample has used a force of the drive that is excluded.
     pub(crate) fn has_excluded_input(&self, drive: usize, kept: usize) -> bool {
         let every = self.decimation();
         self.run.left_out.get(drive).is_some_and(|out| {
+            // The filter is taken to reach one decimated step to either side.
             let to = if every == 1 {
                 kept + 1
             } else {
@@ -112,29 +116,33 @@ impl RecordingSegment {
         })
     }
 
-    /// Times of the samples that are kept.
+    /// Times of the samples after decimation, s.
     pub fn time(&self) -> Vec<f64> {
         decimate_time(&self.run.time, self.decimation())
     }
 
-    /// Keeps a remark, and passes it on to whoever watches.
+    /// Adds a note, and passes it to the listener.
     pub(crate) fn note(&mut self, model: &Model, note: RecordingNote) {
         model.host().note(&note);
         self.run.notes.push(note);
     }
 
-    /// Whether both hold the same numbers.
+    /// Whether both segments have the same times, states and forces.
     pub(crate) fn has_same_samples(&self, other: &Self) -> bool {
         let (a, b) = (&self.run, &other.run);
         a.time == b.time && a.q == b.q && a.qd == b.qd && a.qdd == b.qdd && a.force == b.force
     }
 
-    /// Remarks, for the JSON.
+    /// Notes on the segment.
     pub fn notes(&self) -> &[RecordingNote] {
         &self.run.notes
     }
 
-    /// Calls `visit` with one block of states after the other; `visit` may find a pose without answer.
+    /// Calls `visit` with one block of states after the other. The inner result of `visit` is a pose without a
+    /// solution, which becomes an error with its place in the recording.
+    ///
+    /// Fails with the first pose without a solution, with any error of `visit`, and when an effect needs a load
+    /// that is missing.
     pub fn for_each_block<E: From<Error>>(
         &self,
         model: &Model,
@@ -152,7 +160,7 @@ impl RecordingSegment {
         Ok(())
     }
 
-    /// Some of the states.
+    /// The states of the samples from `start` to `end`, exclusive.
     pub fn states(&self, start: usize, end: usize) -> MotionStates<'_> {
         MotionStates {
             q: slices(&self.run.q, start, end),
@@ -162,18 +170,20 @@ impl RecordingSegment {
         }
     }
 
+    /// Loads of the drives: those set for the segment, or else the measured forces.
     fn loads(&self) -> &[Vec<f64>] {
         let loads = self.load.as_deref().or(self.run.force.as_deref());
         loads.unwrap_or(&[])
     }
 
+    /// Fails when an effect depends on the load and neither loads nor measured forces exist.
     fn check_load(&self, model: &Model) -> Outcome {
         let effects = model.load_dependent_effects();
         if effects.is_empty() || self.load.is_some() || self.run.force.is_some() {
             return Ok(());
         }
         Err(Error::input(message!(
-            "{}: {} depends on the load that the drives carry, but the recording lacks the measured force of {}; \
+            "{}: {} depends on the load of the drives, but the recording lacks the measured force of {}; \
              record it, or name its column with {}",
             self.run.file,
             effects.join(", "),
@@ -182,11 +192,13 @@ impl RecordingSegment {
         )))
     }
 
-    /// A pose without answer, with its place in the recording.
+    /// The error of a pose without a solution, with its place in the recording. `start` is the sample at which the
+    /// block of the fault begins.
     pub fn pose_error(&self, model: &Model, fault: PoseFault, start: usize) -> Error {
         let sample = start + fault.sample;
         let time = self.run.time.get(sample).copied().unwrap_or(f64::NAN);
         let line = self.run.lines.get(sample).copied().unwrap_or(0);
+        // The pose is part of the message, since it often shows a wrong column or unit.
         let place = sample_place_word(&self.run.file);
         let pose: Vec<String> = model
             .active_coordinates()
@@ -195,6 +207,7 @@ impl RecordingSegment {
             .map(|(name, q)| format!("{name} = {:.6}", q.get(sample).copied().unwrap_or(f64::NAN)))
             .collect();
         let columns = Remedy::option(OptionName::Columns);
+        // Each reason has its own explanation and remedy.
         let (what, todo) = match fault.reason {
             PoseReason::NotFinite { input } => {
                 return Error::input(format!(
@@ -212,13 +225,13 @@ impl RecordingSegment {
             ),
             PoseReason::Undefined => (
                 "a term of the model has no finite value at this state",
-                "look at the effects whose expressions hold quotients, roots or exponentials"
+                "check the effects whose expressions contain quotients, roots or exponentials"
                     .into(),
             ),
             PoseReason::Singular => (
-                "the mechanism is singular at this pose, so that forces are not determined",
+                "the mechanism is singular at this pose, where forces are not determined",
                 message!(
-                    "leave the poses around it out of the recording, and check which column is which coordinate ({})",
+                    "remove the poses around it from the recording, and check which column is which coordinate ({})",
                     columns
                 ),
             ),
@@ -232,6 +245,7 @@ impl RecordingSegment {
     }
 }
 
+/// Samples `start` to `end` of each column.
 fn slices(columns: &[Vec<f64>], start: usize, end: usize) -> Vec<&[f64]> {
     columns.iter().map(|column| &column[start..end]).collect()
 }

@@ -1,5 +1,5 @@
-//! Variances of the measured forces, where a recording has them: columns `DRIVE_var`, as the mean of many periods leaves
-//! them beside it.
+//! Variances of the measured forces, if a recording has them: columns `DRIVE_var`, as an average over many periods
+//! provides them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -7,12 +7,14 @@ use modelmill_identify::{PreparedRun, SignalRecording, sample_place_word};
 
 use crate::error::{Error, Outcome};
 
-/// The column with the variance of a drive's force.
+/// Name of the column with the variance of a drive's force, N^2 or (N m)^2.
 pub fn column(drive: &str) -> String {
     format!("{drive}_var")
 }
 
-/// Variances for the samples of a run, `[drive][sample]`; nothing unless all drives have them.
+/// Variances for the samples of a run, `[drive][sample]`; `None` unless all drives have them.
+///
+/// Fails when the samples of the run cannot be matched with lines of the file.
 pub fn recorded_variances(
     recording: &SignalRecording,
     run: &PreparedRun,
@@ -25,7 +27,7 @@ pub fn recorded_variances(
     {
         return Ok(None);
     }
-    // A run may have lost samples at its ends and at gaps; lines of the file tell which are left.
+    // A run may have lost samples at its ends and at gaps; the lines of the file identify those that remain.
     let lines: Vec<u64> = (0..recording.samples())
         .filter_map(|i| recording.line(i))
         .collect();
@@ -36,7 +38,7 @@ pub fn recorded_variances(
         .collect();
     let Some(places) = places else {
         return Err(Error::input(message!(
-            "{}: the variances cannot be matched with the samples that are left after preparation; leave out \
+            "{}: the variances cannot be matched with the samples that remain after preparation; omit \
              {}",
             run.file,
             Remedy::option(OptionName::Weights).with_value("variance")
@@ -53,7 +55,9 @@ pub fn recorded_variances(
         .map(Some)
 }
 
-/// What rows are multiplied by: one over the standard deviation, interleaved per sample; every `every`-th sample.
+/// Weights of the rows: the inverse standard deviation, interleaved per sample; every `every`-th sample.
+///
+/// Fails at a variance that is not positive.
 pub fn factors(
     variance: &[Vec<f64>],
     run: &PreparedRun,
@@ -62,13 +66,14 @@ pub fn factors(
 ) -> Outcome<Vec<f64>> {
     let samples = variance.first().map_or(0, Vec::len);
     let mut factors = Vec::with_capacity(samples.div_ceil(every) * drives.len());
+    // Decimation keeps every n-th sample; its variance stands for the row.
     for sample in (0..samples).step_by(every) {
         for (drive, values) in drives.iter().zip(variance) {
             let value = values[sample];
             if !(value > 0.0 && value.is_finite()) {
                 return Err(Error::input(message!(
-                    "{}, {} {}: {} = {value}, but a variance must be a positive number for {}; leave such \
-                     samples out of the recording",
+                    "{}, {} {}: {} = {value}, but a variance must be a positive number for {}; remove such \
+                     samples from the recording",
                     run.file,
                     sample_place_word(&run.file),
                     run.lines.get(sample).copied().unwrap_or(0),

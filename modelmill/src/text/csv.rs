@@ -1,11 +1,11 @@
-//! Columns of numbers as CSV text.
+//! Writes columns of numbers as CSV text.
 
 use std::fmt::Write as _;
 
 use modelmill_boundary::text::csv_field;
 
-/// A line of names and one line for each sample. Recordings read the names back unchanged, except for control characters and line
-/// breaks, which are replaced.
+/// A line of names and one line for each sample. Recordings read the names back unchanged, except for control
+/// characters and line breaks, which are replaced.
 ///
 /// # Panics
 /// If a column is shorter than the first.

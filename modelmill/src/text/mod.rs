@@ -1,4 +1,4 @@
-//! Text for people: tables, numbers, marks for a terminal, pictures.
+//! Formatting of text for users: tables, numbers, terminal styles, figures.
 
 pub mod csv;
 pub mod style;

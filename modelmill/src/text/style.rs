@@ -1,16 +1,16 @@
-//! Marks in text for a terminal: bold, dim, colours.
+//! Styles of text in a terminal: bold, dim, colours.
 
-/// Marks text for the terminal, or leaves it as it is.
+/// Styles text for a terminal, or returns it unchanged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TerminalStyle(bool);
 
 impl TerminalStyle {
     /// With ANSI escape sequences for colours.
     pub const COLOURED: Self = Self(true);
-    /// Without any mark.
+    /// Without styles.
     pub const PLAIN: Self = Self(false);
 
-    /// Text between the escape sequence of a code and the reset, if marks are on.
+    /// Text between the escape sequence of a code and the reset, if styles are on.
     fn paint(self, code: &str, text: &str) -> String {
         if self.0 {
             format!("\x1b[{code}m{text}\x1b[0m")

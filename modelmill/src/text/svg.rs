@@ -1,20 +1,24 @@
-//! Figures as SVG files: panels of curves over one axis, one below the other.
+//! Figures as SVG files: panels of curves over one time axis, one below the other. Lengths are in SVG units.
 
 use std::fmt::Write as _;
 
+/// Width of a figure.
 const WIDTH: f64 = 900.0;
 /// Height of a panel.
 const PANEL: f64 = 150.0;
 /// Room between panels, for the names of curves.
 const GAP: f64 = 34.0;
+/// Margin left of the panels, for the scale.
 const LEFT: f64 = 80.0;
+/// Margin right of the panels.
 const RIGHT: f64 = 16.0;
+/// Space above the first panel, for the title.
 const TOP: f64 = 44.0;
-/// Points of a curve; more would not be seen.
+/// Largest number of points of a curve; more would not be visible.
 const POINTS: usize = 820;
-/// Colours of curves in the style.
+/// Number of curve colours in the style.
 const COLOURS: usize = 3;
-/// Light and dark, with the colours of all pages; a figure is a file of its own too.
+/// Style sheet for light and dark mode, with the colours of all pages; it is part of each figure.
 const STYLE: &str = "\
 .figure{--paper:#fff;--ink:#1a1d21;--faint:#59636c;--line:#d9dee3;--c0:#1f5fa8;--c1:#b53d26;--c2:#2a7147;font-family:system-ui,sans-serif}
 @media screen and (prefers-color-scheme:dark){.figure{--paper:#14171a;--ink:#e4e7ea;--faint:#a2acb5;--line:#343b42;--c0:#74b2f5;--c1:#f0826a;--c2:#6cc492}}
@@ -32,21 +36,22 @@ const STYLE: &str = "\
 .figure text.scale{font-size:11px;fill:var(--faint)}
 ";
 
-/// How a panel looks, beyond what its curves say.
+/// Options of a panel.
 #[derive(Default)]
 pub struct PanelStyle<'a> {
-    /// Largest magnitude that is shown, what is beyond is cut off; that of the curves if absent.
+    /// Largest magnitude of the scale; larger values are cut off. `None` takes the largest of the curves.
     pub limit: Option<f64>,
     /// Times of vertical lines, s.
     pub marks: &'a [f64],
 }
 
-/// A figure as it grows.
+/// A figure under construction.
 pub struct SvgFigure<'a> {
     /// Title as SVG text.
     title: String,
     /// Times of the samples, s.
     time: &'a [f64],
+    /// SVG of the panels so far.
     body: String,
     /// Number of panels so far.
     panels: usize,
@@ -68,7 +73,7 @@ impl<'a> SvgFigure<'a> {
         self.panel_with(title, curves, &PanelStyle::default());
     }
 
-    /// The same with a scale of its own or marks.
+    /// As [`Self::panel`], with a fixed scale or marks.
     pub fn panel_with(&mut self, title: &str, curves: &[(&str, &[f64])], look: &PanelStyle<'_>) {
         let top = TOP + GAP + self.panels as f64 * (PANEL + GAP);
         let largest = curves
@@ -131,6 +136,7 @@ impl<'a> SvgFigure<'a> {
             let behind: f64 = curves[k + 1..].iter().map(|(name, _)| width(name)).sum();
             let colour = k % COLOURS;
             let n = values.len().max(2) - 1;
+            // Long curves are thinned out, which keeps all peaks.
             let mut points = String::new();
             for (i, value) in thin_out(values, POINTS) {
                 let x = LEFT + plot_width * i as f64 / n as f64;
@@ -149,7 +155,7 @@ impl<'a> SvgFigure<'a> {
         self.panels += 1;
     }
 
-    /// The file's text.
+    /// The text of the file, with the time axis below the last panel.
     pub fn finish(self) -> String {
         let bottom = TOP + GAP + self.panels as f64 * (PANEL + GAP);
         let height = bottom + 10.0;
@@ -169,8 +175,9 @@ impl<'a> SvgFigure<'a> {
     }
 }
 
-/// A sheet of 900 units with a title, in the colours of all figures: classes `c0`, `c1` and `c2` of curves, discs and their names,
-/// `zero` of lines, `scale` of small text, `part` of what is marked. `title` and `body` are SVG.
+/// A sheet of 900 units with a title, in the colours of all figures. Classes are `c0`, `c1` and `c2` for curves,
+/// discs and their names, `zero` for lines, `scale` for small text, `part` for marked areas. `title` and `body` are
+/// SVG.
 pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     format!(
         r#"<svg xmlns="http://www.w3.org/2000/svg" class="figure" role="img" aria-label="{title}" viewBox="0 0 {WIDTH} {height:.0}">
@@ -183,8 +190,12 @@ pub fn sheet(title: &str, left: f64, height: f64, body: &str) -> String {
     )
 }
 
-/// A curve in about `wanted` points, each with its index: the least and the largest value of each of many segments, so that no peak is
-/// lost. All values if they are few enough.
+/// A curve in about `wanted` points, each with its index: the smallest and the largest value of each of many
+/// segments, so that every peak is kept. All values if they are few enough.
+///
+/// ```
+/// assert_eq!(modelmill::text::svg::thin_out(&[0.0, 5.0], 10), [(0, 0.0), (1, 5.0)]);
+/// ```
 pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();
@@ -204,7 +215,7 @@ pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     points
 }
 
-/// Text as HTML and SVG take it.
+/// Text with the characters escaped that HTML and SVG reserve.
 pub fn escape(text: &str) -> String {
     modelmill_boundary::text::html(text).into_owned()
 }

@@ -1,15 +1,24 @@
-//! Tables and numbers in text.
+//! Formats tables and numbers.
 
-/// How a column stands.
+/// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnAlignment {
-    /// Text.
+    /// Left, for text.
     Left,
-    /// Numbers.
+    /// Right, for numbers.
     Right,
 }
 
-/// Lays out rows under a head, two blanks between columns, `indent` blanks in front; no trailing blanks.
+/// Lays out rows below a header, with two blanks between columns and `indent` blanks in front; without trailing
+/// blanks.
+///
+/// ```
+/// use modelmill::text::table::{ColumnAlignment, table};
+///
+/// let columns = [("a", ColumnAlignment::Left), ("n", ColumnAlignment::Right)];
+/// let rows = [vec!["x".to_owned(), "10".to_owned()]];
+/// assert_eq!(table(2, &columns, &rows), ["  a   n", "  x  10"]);
+/// ```
 pub fn table(
     indent: usize,
     columns: &[(&str, ColumnAlignment)],
@@ -46,16 +55,21 @@ pub fn table(
         .collect()
 }
 
-/// A number with six significant digits, without needless zeros.
+/// A number with six significant digits.
 pub fn number(value: f64) -> String {
     significant(value, 6)
 }
 
-/// A value and its standard deviation, both to the second digit of the deviation.
+/// A value and its standard deviation, both rounded to the second digit of the standard deviation.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::with_deviation(1.23456, 0.012), ["1.235", "0.012"]);
+/// ```
 pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
     // Position of the first digit of the standard deviation.
     let exponent = deviation.abs().log10().floor();
     let decimals = 1.0 - exponent;
+    // Very large and very small standard deviations use significant digits instead.
     if !(value.is_finite() && (0.0..=12.0).contains(&decimals)) {
         return [number(value), number(deviation)];
     }
@@ -69,6 +83,10 @@ pub fn with_deviation(value: f64, deviation: f64) -> [String; 2] {
 }
 
 /// A number with some significant digits; very large and very small ones with an exponent.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::significant(0.123456, 3), "0.123");
+/// ```
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -90,7 +108,11 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// A relative figure in per cent: `11.3 %`, `6.28e-5 %`.
+/// A relative figure in per cent: `11.3 %`, `6.28e-5 %`; `-` without a value.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::percent(Some(0.113)), "11.3 %");
+/// ```
 pub fn percent(value: Option<f64>) -> String {
     match value {
         None => "-".to_owned(),
@@ -108,7 +130,11 @@ fn three_digits(value: f64) -> String {
     }
 }
 
-/// `1 loop`, `2 loops`.
+/// A count with its noun, such as `1 loop`, `2 loops`.
+///
+/// ```
+/// assert_eq!(modelmill::text::table::count(2, "loop", "loops"), "2 loops");
+/// ```
 pub fn count(n: usize, one: &str, many: &str) -> String {
     if n == 1 {
         format!("1 {one}")

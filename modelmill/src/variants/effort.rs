@@ -1,6 +1,6 @@
-//! What a drive has to give along motions: force, power and work.
+//! Requirements on a drive along motions: force, power and work.
 
-/// What a drive has to give. Power is force times the rate along which the drive acts.
+/// Requirements on a drive. Power is force times the rate along which the drive acts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveEffort {
     /// The largest magnitude of the force, N or N m.
@@ -11,26 +11,33 @@ pub struct DriveEffort {
     pub peak_power: f64,
     /// Root mean square of the power over all samples, W.
     pub rms_power: f64,
-    /// Work that the drive does while it gives power, J; what it takes up is not set off.
+    /// Work of the drive while its power is positive, J; negative power is not subtracted.
     pub work: f64,
-    /// Work given less work taken up, J.
+    /// Positive minus negative work, J.
     pub net_work: f64,
 }
 
-/// Sums over samples.
+/// Sums over samples, from which the requirements are computed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct EffortSums {
+    /// Number of samples.
     samples: usize,
+    /// Largest magnitude of the force, N or N m.
     peak: f64,
+    /// Sum of squares of the force.
     squares: f64,
+    /// Largest magnitude of the power, W.
     peak_power: f64,
+    /// Sum of squares of the power.
     squares_of_power: f64,
+    /// Positive work, J.
     work: f64,
+    /// Positive minus negative work, J.
     net_work: f64,
 }
 
 impl EffortSums {
-    /// Adds a motion: times, forces and rates, a number for each sample. Between samples power is taken to be linear.
+    /// Adds a motion: times, s, forces and rates, one value for each sample. Power is linear between samples.
     pub(super) fn add(&mut self, time: &[f64], force: &[f64], rate: &[f64]) {
         let power: Vec<f64> = force.iter().zip(rate).map(|(f, v)| f * v).collect();
         for (f, p) in force.iter().zip(&power) {
@@ -47,7 +54,7 @@ impl EffortSums {
         }
     }
 
-    /// The figures of all that was added.
+    /// The requirements over all motions that were added.
     pub(super) fn effort(self) -> DriveEffort {
         let mean = |squares: f64| (squares / self.samples.max(1) as f64).sqrt();
         DriveEffort {
@@ -61,7 +68,7 @@ impl EffortSums {
     }
 }
 
-/// The mean of the positive part of what goes from `a` to `b` on a line.
+/// The mean of the positive part of a line from `a` to `b`.
 fn mean_of_positive(a: f64, b: f64) -> f64 {
     match (a > 0.0, b > 0.0) {
         (true, true) => 0.5 * (a + b),

@@ -1,4 +1,4 @@
-//! Limits of the model files along motions: which the variant exceeds, and which both do.
+//! Limits of the model files along motions: the use of each limit by two variants.
 
 use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant, LimitMargin};
 
@@ -7,10 +7,10 @@ use crate::excite::plant::{AXES, ModelPlant, used_fraction};
 use crate::model::Model;
 use crate::stretch::{BLOCK, RecordingSegment};
 
-/// The part beyond 1 that is rounding.
+/// A limit counts as exceeded only by more than this fraction, which is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// How two models keep a limit.
+/// The state of a limit in two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitCrossing {
     /// The second model exceeds it, the first one does not.
@@ -23,19 +23,21 @@ pub enum LimitCrossing {
     Kept,
 }
 
-/// How far two models go within a limit. Each is held against the limit of its own file.
+/// The use of a limit by two models. Each is compared with the limit of its own file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LimitUse {
-    /// What is limited, named as `excite` names it: `theta1`, `theta1_d`, `spindle_left`, `R3m.x`, `singularity of the loops`.
+    /// The limited quantity, with the name that `excite` uses: `theta1`, `theta1_d`, `spindle_left`, `R3m.x`,
+    /// `singularity of the loops`.
     pub limit: String,
-    /// The ranges of both files, in the unit of what is limited; none where a file says none, and for singularities.
+    /// The ranges of both files, in the unit of the quantity; `None` if a file has none, and for singularities.
     pub ranges: [Option<[f64; 2]>; 2],
-    /// The part of the limit that each uses, 1 at the limit, counted from the middle of its range; none without a limit.
+    /// The fraction of the limit that each model uses, 1 at the limit, counted from the middle of the range; `None`
+    /// without a limit.
     pub used: [Option<f64>; 2],
 }
 
 impl LimitUse {
-    /// Whether it is exceeded, and by which.
+    /// Whether the limit is exceeded, and by which model.
     pub fn crossing(&self) -> LimitCrossing {
         let is_beyond = self
             .used
@@ -49,10 +51,11 @@ impl LimitUse {
     }
 }
 
-/// The limits of two models, as far as they were used.
+/// The limits of two models, with their use so far.
 pub(super) struct VariantLimits {
+    /// One entry for each limit of either file.
     found: Vec<LimitUse>,
-    /// The limits that poses tell, without those of forces: these come from forces under the model's own load.
+    /// Limits that depend on poses, without those of forces: forces are computed under the model's own load.
     of_poses: [modelmill_spec::MotionLimits; 2],
 }
 
@@ -69,7 +72,9 @@ impl VariantLimits {
         }
     }
 
-    /// Adds a motion: the states of each model, and its forces `[drive][sample]`.
+    /// Adds a motion: the states of each model, and its forces `[drive][sample]`, N or N m.
+    ///
+    /// Fails when a model cannot follow the motion.
     pub(super) fn add(
         &mut self,
         models: [&Model; 2],
@@ -80,6 +85,7 @@ impl VariantLimits {
             let mechanism = &model.derivation.mechanism;
             let run = &states[m].run;
             let (active, _) = model.derivation.coordinates();
+            // Limits of active coordinates and of their derivatives are compared sample by sample.
             for (i, limits) in &mechanism.limits.coordinates {
                 let Some(k) = active.iter().position(|a| *a == i.0) else {
                     continue;
@@ -96,6 +102,7 @@ impl VariantLimits {
                     }
                 }
             }
+            // Limits of forces use the forces of the variant itself.
             for (drive, range) in &mechanism.limits.forces {
                 let name = &mechanism.drives[drive.0].name;
                 let values = &forces[m][drive.0];
@@ -106,7 +113,9 @@ impl VariantLimits {
         Ok(())
     }
 
-    /// Passive coordinates, points and distances from singular poses.
+    /// Adds passive coordinates, points and singular values, which need the pose of every sample.
+    ///
+    /// Fails when the model cannot follow the motion.
     fn add_poses(&mut self, m: usize, model: &Model, states: &RecordingSegment) -> Outcome {
         let limits = self.of_poses[m].clone();
         let plant = ModelPlant::new(model, &limits);
@@ -114,11 +123,12 @@ impl VariantLimits {
         if names.is_empty() {
             return Ok(());
         }
-        let what = format!("holding {} against its limits", model.name);
+        let what = format!("comparing {} with its limits", model.name);
         let run = &states.run;
         let samples = states.samples();
         let found = model.host().run_job(&what, samples, |job| {
             let mut most = vec![f64::NEG_INFINITY; names.len()];
+            // The motion is evaluated in blocks, so that progress is reported and memory stays small.
             for start in (0..samples).step_by(BLOCK) {
                 let end = (start + BLOCK).min(samples);
                 job.step(end - start)?;
@@ -153,8 +163,9 @@ impl VariantLimits {
         Ok(())
     }
 
-    /// Keeps the largest part of a limit that a model uses.
+    /// Keeps the largest fraction of a limit that a model uses, over all motions.
     fn record_use(&mut self, m: usize, name: &str, range: Option<[f64; 2]>, used: f64) {
+        // The first use of a limit adds its entry.
         let known = self.found.iter().position(|one| one.limit == name);
         let k = known.unwrap_or_else(|| {
             self.found.push(LimitUse {
@@ -169,20 +180,21 @@ impl VariantLimits {
         one.used[m] = Some(one.used[m].map_or(used, |before| before.max(used)));
     }
 
-    /// All limits.
+    /// The uses of all limits.
     pub(super) fn into_uses(self) -> Vec<LimitUse> {
         self.found
     }
 }
 
-/// The part of a range that values use, from its middle.
+/// The largest fraction of a range that values use, from its middle.
 fn used_share_of_range(values: &[f64], [low, high]: [f64; 2]) -> f64 {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let far = values.iter().map(|v| (v - middle).abs() / half);
     far.fold(0.0, f64::max)
 }
 
-/// The range of a passive coordinate or of a point along an axis.
+/// The range of a passive coordinate or of a point along an axis, by the name of its limit; `None` for other
+/// limits.
 fn range_of(model: &Model, limits: &modelmill_spec::MotionLimits, name: &str) -> Option<[f64; 2]> {
     let mechanism = &model.derivation.mechanism;
     let coordinates = limits.coordinates.iter();
@@ -190,6 +202,7 @@ fn range_of(model: &Model, limits: &modelmill_spec::MotionLimits, name: &str) ->
     if let Some((_, limits)) = coordinates.next() {
         return limits.position;
     }
+    // Points have names such as `R3m.x`.
     let (point, axis) = name.rsplit_once('.')?;
     let axis = AXES.iter().position(|a| *a == axis)?;
     let mut points = limits.points.iter();

@@ -1,5 +1,5 @@
-//! Two variants of a machine along the same motions: what each drive has to give, which products of parameters make the
-//! difference, which limits are exceeded, and how far each is off what was measured.
+//! Comparison of two variants of a machine along the same motions: requirements on each drive, the products of
+//! parameters that cause the difference, exceeded limits, and errors against measured forces.
 
 mod counterparts;
 mod effort;
@@ -24,42 +24,43 @@ pub use effort::DriveEffort;
 pub use limits::{LimitCrossing, LimitUse};
 pub use terms::{ProductShare, TermShare};
 
-/// A difference of forces below this part of them is rounding: nothing makes it.
+/// A difference of forces below this fraction of them is rounding and has no cause.
 const ROUNDING: f64 = 1e-8;
 
-/// Two models of one machine along the same motions.
+/// The comparison of two models of one machine along the same motions.
 #[derive(Clone, Debug)]
 pub struct VariantComparison {
-    /// Names of the recordings whose motions these are.
+    /// File names of the recordings that provide the motions.
     pub recordings: Vec<String>,
-    /// Samples of all recordings.
+    /// Number of samples of all recordings.
     pub samples: usize,
-    /// Time from the first to the last sample of each stretch, summed up, s.
+    /// Total duration of the segments, s.
     pub seconds: f64,
-    /// The drives that both models have, in the order of the first.
+    /// The drives that both models have, in the order of the first model.
     pub drives: Vec<DriveVariants>,
-    /// The limits of both files; those that neither model exceeds as well.
+    /// The limits of both files, including those that neither model exceeds.
     pub limits: Vec<LimitUse>,
-    /// Error figures against measured forces, as [`Model::compare`] gives them; `None` where a model was held against none.
+    /// Error figures compared with measured forces, as [`Model::compare`] computes them; `None` for a model without
+    /// measured forces.
     pub errors: [Option<ErrorFigures>; 2],
-    /// What was left out and taken for granted, and what each recording is to be read with.
+    /// Notes: what was left out, assumptions, and notes on the recordings.
     pub notes: Vec<RecordingNote>,
 }
 
-/// A drive in both models.
+/// The comparison of one drive.
 #[derive(Clone, Debug)]
 pub struct DriveVariants {
     /// Its name.
     pub drive: String,
     /// Unit of its force: N or N m.
     pub unit: &'static str,
-    /// What the first model asks of it.
+    /// Requirements of the first model.
     pub before: DriveEffort,
-    /// What the second model asks of it.
+    /// Requirements of the second model.
     pub after: DriveEffort,
-    /// The force of the second model less that of the first, sample by sample.
+    /// The force of the second model minus that of the first, sample by sample.
     pub difference: ForceDifference,
-    /// What makes the difference, the largest share first; empty where there is none. Shares add up to 1.
+    /// Causes of the difference, the largest share first; empty without a difference. Shares add up to 1.
     pub products: Vec<ProductShare>,
 }
 
@@ -73,20 +74,33 @@ pub struct ForceDifference {
 }
 
 impl VariantComparison {
-    /// Fails where two models cannot be held beside each other, as [`Variants::along`] would, before any recording is read.
+    /// Fails when two models cannot be compared, as [`VariantComparison::along_recordings`] would, before any
+    /// recording is read.
+    ///
+    /// ```
+    /// use modelmill::Model;
+    /// use modelmill::variants::VariantComparison;
+    ///
+    /// let arm = Model::open("../model-spec/models/two_link.toml")?;
+    /// VariantComparison::check([&arm, &arm])?;
+    /// # Ok::<(), modelmill::Error>(())
+    /// ```
     pub fn check(models: [&Model; 2]) -> Outcome {
         ModelCounterparts::match_models(models).map(|_| ())
     }
 
-    /// Holds two models beside each other along the motions of recordings: `runs` are the same recordings as the first and as
-    /// the second model reads them. Motions are those of the first reading, base parameters those of the files. Effects that
-    /// depend on the load see the force that their own model has without them, so that a recording needs no forces.
+    /// Compares two models along the motions of recordings: `runs` are the same recordings, read for the first and
+    /// for the second model. Motions are those of the first, base parameters those of the files. Effects that
+    /// depend on the load use the force of their own model without these effects, so that a recording needs no
+    /// forces.
     ///
-    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow a motion.
+    /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow
+    /// a motion.
     pub fn along_recordings(
         models: [&Model; 2],
         runs: [&[&PreparedRecording]; 2],
     ) -> Outcome<Self> {
+        // Stage 1: assign coordinates and drives, and collect notes of both models.
         let counterparts = ModelCounterparts::match_models(models)?;
         let stretches = |runs: &[&PreparedRecording]| -> Vec<RecordingSegment> {
             runs.iter().flat_map(|one| one.segments.clone()).collect()
@@ -99,6 +113,7 @@ impl VariantComparison {
                 notes.push(note);
             }
         }
+        // Stage 2: sums over all motions: efforts, differences, causes and limits.
         let mut terms = SummandColumns::from_models(models);
         let mut limits = limits::VariantLimits::from_models(models);
         let n = counterparts.drives.len();
@@ -115,6 +130,7 @@ impl VariantComparison {
                 for (m, i) in [d, e].into_iter().enumerate() {
                     gathered[k][m].add(time, &forces[m][i], &rates[m][i]);
                 }
+                // The difference of the forces, with its peak and sum of squares.
                 let pairs = forces[1][e].iter().zip(&forces[0][d]);
                 let rest_of_drive: Vec<f64> = pairs.map(|(after, before)| after - before).collect();
                 for x in &rest_of_drive {
@@ -131,6 +147,7 @@ impl VariantComparison {
                 .zip(time.first())
                 .map_or(0.0, |(end, start)| end - start);
         }
+        // Stage 3: the results of each drive.
         let drives = (counterparts.drives.iter().enumerate()).map(|(k, [d, _])| {
             let [before, after] = gathered[k].map(EffortSums::effort);
             let (peak, squares) = differences[k];
@@ -150,10 +167,11 @@ impl VariantComparison {
             }
         });
         let drives = drives.collect();
+        // Stage 4: each model is compared with measured forces in its own reading.
         let errors = for_both(|m| errors(models[m], &stretches(runs[m])))?;
         if errors.iter().all(Option::is_none) {
             notes.push(RecordingNote::info(
-                "No recording has the forces of all drives, so that neither model is held against measured ones.",
+                "No recording has the forces of all drives, so neither model is compared with measured forces.",
             ));
         }
         Ok(Self {
@@ -168,16 +186,18 @@ impl VariantComparison {
     }
 }
 
-/// Something of the first model and of the second.
+/// Computes a value for the first and for the second model.
 fn for_both<T>(mut of: impl FnMut(usize) -> Outcome<T>) -> Outcome<[T; 2]> {
     Ok([of(0)?, of(1)?])
 }
 
-/// Forces of a model for the values of its file, `[drive][sample]`.
+/// Forces of a model at the values of its file, `[drive][sample]`, N or N m.
+///
+/// Fails when the model cannot follow the motion; the message names it.
 fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,
-        // Which of both models cannot follow is not seen from the recording.
+        // The error names the model, since the recording does not show which of both cannot follow.
         error => Error::input(message!(
             "{} cannot follow the motion: {}",
             model.path,
@@ -186,24 +206,25 @@ fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>>
     })
 }
 
-/// Which effects see the load, and what they take for it.
+/// The note on effects that depend on the load, and on the load that they use; `None` without such effects.
 fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
     let mut effects: Vec<&str> = models
         .iter()
         .flat_map(|m| m.load_dependent_effects())
         .collect();
+    // Both models may have the same effect.
     effects.sort_unstable();
     effects.dedup();
     (!effects.is_empty()).then(|| {
         RecordingNote::info(format!(
-            "What a drive carries, on which {} depends, is the force of each model itself without that effect, not the measured \
-             one; errors take the measured one, as `compare` does.",
+            "The load of a drive, on which {} depends, is the force of each model without that effect, not the measured \
+             one. Errors use the measured one, as `compare` does.",
             effects.join(", ")
         ))
     })
 }
 
-/// Error figures of a model along those recordings that have forces.
+/// Error figures of a model along those recordings that have forces; `None` if none has.
 fn errors(model: &Model, runs: &[RecordingSegment]) -> Outcome<Option<ErrorFigures>> {
     let mut measured = runs.to_vec();
     measured.retain(|one| one.run.force.is_some());

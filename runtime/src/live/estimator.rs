@@ -1,47 +1,49 @@
-//! Recursive least squares with forgetting, as the triangle of a QR factorisation.
+//! Recursive least squares with forgetting, in the form of the R factor of a QR factorisation.
 //!
-//! Rows are turned into the triangle by rotations (W. Givens 1958; G. Golub, C. Van Loan, Matrix Computations, 6.5). The
-//! triangle is a square root of the information matrix, so that it needs half the digits, and forgetting cannot blow it up
-//! where nothing moves: information of a direction that is not excited fades to zero, and a prior takes its place.
+//! Rotations eliminate each new row against the R factor (W. Givens 1958; G. Golub, C. Van Loan, Matrix Computations,
+//! 6.5). The R factor is a square root of the information matrix, so it needs half the digits. Forgetting cannot make
+//! it grow where nothing moves: the information of a direction that is not excited fades to zero, and a prior takes its
+//! place.
 
 use crate::Real;
 
-/// What is smaller than this has faded and becomes zero, so that no step is slow by numbers below the smallest normal one.
+/// Entries smaller than this become zero, so that no step is slowed down by subnormal numbers.
 const FADED: f64 = 1e-30;
 
 /// Recursive estimator of `NB` parameters with forgetting.
 ///
 /// ```
-/// use modelmill_runtime::live::{Estimator, Prior};
+/// use modelmill_runtime::live::{EstimatorPrior, RecursiveEstimator};
 ///
-/// let mut estimator = Estimator::<f64, 2>::new();
+/// let mut estimator = RecursiveEstimator::<f64, 2>::new();
 /// for (row, value) in [([1.0, 0.0], 3.0), ([1.0, 1.0], 5.0), ([1.0, 2.0], 7.0)] {
 ///     estimator.forget(0.9);
 ///     assert!(estimator.add(row, value));
 /// }
-/// let values = estimator.solve(&Prior::none());
+/// let values = estimator.solve(&EstimatorPrior::uninformative());
 /// assert!((values[0] - 3.0).abs() < 1e-12 && (values[1] - 2.0).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct RecursiveEstimator<T, const NB: usize> {
-    /// The upper triangle; below its diagonal stand zeros.
+    /// The R factor, upper triangular; entries below its diagonal are zero.
     pub(super) rows: [[T; NB]; NB],
-    /// The right side of each of its rows.
+    /// The right-hand side of each of its rows.
     pub(super) values: [T; NB],
+    /// Sum of squared residuals, faded as the rows are.
     squares: T,
 }
 
-/// What is known of parameters besides the rows: each within a deviation of its own.
+/// Prior knowledge of the parameters: expected values with standard deviations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatorPrior<T, const NB: usize> {
     /// Expected values.
     pub values: [T; NB],
-    /// One over the deviation of each, as a share of the deviation of a row; 0 where nothing is known.
+    /// One over the standard deviation of each, relative to the standard deviation of a row; 0 where nothing is known.
     pub weights: [T; NB],
 }
 
 impl<T: Real, const NB: usize> EstimatorPrior<T, NB> {
-    /// Nothing is known.
+    /// A prior without any information.
     #[must_use]
     pub fn uninformative() -> Self {
         let zeros = [T::from_f64(0.0); NB];
@@ -59,7 +61,7 @@ impl<T: Real, const NB: usize> Default for RecursiveEstimator<T, NB> {
 }
 
 impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
-    /// Knows nothing yet.
+    /// An estimator without any information.
     #[must_use]
     pub fn new() -> Self {
         let zero = T::from_f64(0.0);
@@ -70,12 +72,12 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
         }
     }
 
-    /// Lets all information fade to this share of itself, between 0 and 1: `exp(-dt/tau)` for a memory of `tau` seconds.
+    /// Multiplies all information by this share, between 0 and 1: `exp(-dt/tau)` for a memory of `tau` seconds.
     pub fn forget(&mut self, share: T) {
         self.scale_information(share.sqrt());
     }
 
-    /// [`Self::forget`] by the root of the share.
+    /// [`Self::forget`] with the root of the share, which multiplies the rows.
     pub(super) fn scale_information(&mut self, root: T) {
         let faded = T::from_f64(FADED);
         let fade = |x: &mut T| {
@@ -89,9 +91,10 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
         self.squares = self.squares * root * root;
     }
 
-    /// Takes a row of the regressor and what was measured for it, both divided by the deviation of the measurement.
+    /// Adds a row of the regressor and the value measured for it, both divided by the standard deviation of the
+    /// measurement.
     ///
-    /// Returns `false`, and takes nothing, where one of the numbers is none.
+    /// Returns `false`, and adds nothing, if one of the numbers is not finite.
     #[must_use = "a row that was not taken is missing"]
     pub fn add(&mut self, mut row: [T; NB], mut value: T) -> bool {
         if !(value.is_finite() && row.iter().all(|x| x.is_finite())) {
@@ -109,9 +112,9 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
         true
     }
 
-    /// The parameters that explain all rows best, with a prior, which does not fade.
+    /// The parameters that explain all rows best, with a prior that does not fade.
     ///
-    /// A parameter of which neither knows anything is 0. Takes a copy of the triangle and `NB` rows more.
+    /// A parameter without any information is 0. Works on a copy of the R factor and adds `NB` rows to it.
     #[must_use]
     pub fn solve(&self, prior: &EstimatorPrior<T, NB>) -> [T; NB] {
         let zero = T::from_f64(0.0);
@@ -124,7 +127,7 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
             if let Some(entry) = row.get_mut(k) {
                 *entry = *weight;
             }
-            // A prior that is no number says nothing.
+            // A prior that is not finite is ignored.
             _ = all.add(row, *weight * *value);
         }
         let mut solution = [zero; NB];
@@ -139,13 +142,13 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
         solution
     }
 
-    /// Sum of the squares that the rows leave of the measured values, faded as they are.
+    /// Sum of squared residuals of the rows, faded as they are.
     #[must_use]
     pub fn sum_of_squares(&self) -> T {
         self.squares
     }
 
-    /// The diagonal of the information matrix: how much is known of each parameter, all others given.
+    /// The diagonal of the information matrix: information on each parameter, all others given.
     #[must_use]
     pub fn information(&self) -> [T; NB] {
         let mut sums = [T::from_f64(0.0); NB];
@@ -158,7 +161,7 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
     }
 }
 
-/// Cosine and sine of the rotation that turns entry `k` of a row into the triangle's own; none where it is zero already.
+/// Cosine and sine of the rotation that eliminates entry `k` of a row with that of the R factor; `None` if it is zero.
 pub(super) fn givens_rotation<T: Real, const N: usize>(
     own: &[T; N],
     row: &[T; N],
@@ -166,11 +169,11 @@ pub(super) fn givens_rotation<T: Real, const N: usize>(
 ) -> Option<(T, T)> {
     let (a, b) = (*own.get(k)?, *row.get(k)?);
     let length = (a * a + b * b).sqrt();
-    // Squares of what is very small are zero.
+    // The squares of very small numbers underflow to zero.
     (b != T::from_f64(0.0) && length > T::from_f64(0.0)).then(|| (a / length, b / length))
 }
 
-/// Turns two rows into each other, from entry `from` on.
+/// Rotates two rows in their plane, from entry `from` on.
 #[inline]
 pub(super) fn rotate_rows<T: Real, const N: usize>(
     c: T,

@@ -1,7 +1,7 @@
 //! The watch: samples in, a verdict out.
 //!
-//! Decision: names come from samples after the alarm only, because a change that covers part of a window looks like
-//! a change of other parameters.
+//! Decision: the parameter is identified from samples after the alarm only, because a change that covers part of a
+//! window looks like a change of other parameters.
 
 use super::averages::{DriveAverages, WatchRow};
 use super::comparison::{ChangeScore, WindowComparison};
@@ -10,22 +10,23 @@ use super::options::{Options, WatchSchedule};
 use super::scatter::WindowScatter;
 use crate::Real;
 
-/// A change that another one explains this many times less likely (as twice the logarithm) is no rival: 1 to 10000.
+/// A change that explains the data this much worse (twice the log likelihood ratio) is no rival: odds of 1 to 10000.
 const RIVAL_LOG_RATIO: f64 = 18.42;
-/// How much of a window's usual information the reference has in [`Watch::estimate`].
+/// Information of the reference in [`ParameterWatch::estimate`], as a share of the usual information of a window.
 const REFERENCE_WEIGHT: f64 = 0.01;
-/// The same of the reference on its own column, while it learns the noise.
+/// Ridge of the reference: a share of its own information on each parameter.
 const RIDGE: f64 = 1e-6;
 
-/// What a watch says after a sample.
+/// State of a watch after a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WatchVerdict<T, const NB: usize> {
     /// It still learns noise and scatter.
     Learning,
-    /// Nothing has changed by more than windows differ anyway.
+    /// No change exceeds the usual differences between windows.
     Quiet,
-    /// Something has changed; stays until [`Watch::accept`], and is refined while the window shows the change. At first
-    /// the window holds samples from before too, and another parameter may seem to have changed: see [`Change::is_told`].
+    /// A parameter has changed. This state remains until [`ParameterWatch::accept`] and is refined while the window
+    /// shows the change. At first the window also contains samples from before, and another parameter may seem to have
+    /// changed: see [`WatchChange::is_identified`].
     Changed(WatchChange<T, NB>),
 }
 
@@ -34,30 +35,38 @@ pub enum WatchVerdict<T, const NB: usize> {
 pub struct WatchChange<T, const NB: usize> {
     /// The parameter whose change alone explains most, in the order of the columns of `H_min`.
     pub parameter: usize,
-    /// By how much it changed, in its unit; too little while the window still holds samples from before.
+    /// By how much it changed, in its unit; too small while the window still contains samples from before.
     pub amount: T,
-    /// Standard deviation of that.
+    /// Standard deviation of `amount`, in its unit.
     pub deviation: T,
-    /// Square of the change in deviations, as windows scatter.
+    /// Square of the change over its variance, which includes the scatter of windows.
     pub gain: T,
-    /// Share of all that the window holds against the reference, noise included, that this change alone explains.
+    /// Share of the differences between window and reference, noise included, that this change alone explains, 0 to 1.
     pub share: T,
     /// A second parameter that changed too: together they explain more than the first alone, and more than chance.
     pub second_change: Option<usize>,
-    /// Parameters whose change alone would explain nearly as much along this motion: it may as well be one of these.
+    /// Parameters whose change alone would explain nearly as much along this motion: each may be the one that changed.
     pub rivals: [bool; NB],
-    /// Whether the same parameter has come out for as long as a window, of samples from after the alarm alone.
+    /// Whether the same parameter has changed most for the length of a window, in samples from after the alarm only.
     pub steady: bool,
 }
 
 impl<T, const NB: usize> WatchChange<T, NB> {
-    /// Whether the parameter is the one: it comes out steadily, and no other one's change explains nearly as much.
+    /// Whether the parameter is identified: `steady`, and no change of another one explains nearly as much.
     #[must_use]
     pub fn is_identified(&self) -> bool {
         self.steady && !self.rivals.contains(&true)
     }
+
+    /// The name of [`WatchChange::is_identified`] in earlier versions.
+    #[deprecated(note = "renamed to `is_identified`")]
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        self.is_identified()
+    }
 }
 
+/// Stages of a watch, in this order; [`ParameterWatch::accept`] returns to `Scatter`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum WatchStage {
     Noise,
@@ -67,40 +76,40 @@ enum WatchStage {
 
 /// A watch over `NB` base parameters by the forces of `NQ` drives.
 ///
-/// It has room for some `5 NB^2` numbers.
+/// It consists of about `5 NB^2` numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterWatch<T, const NB: usize, const NQ: usize> {
     nominal: [T; NB],
     plan: WatchSchedule<T>,
     stage: WatchStage,
     drives: [DriveAverages<T, NB>; NQ],
-    /// Blocks that wait to be turned into the triangles, a few drives in each step.
+    /// Blocks to be added to the estimators, a few drives in each step; whitened once the noise is known.
     waiting: [Option<WatchRow<T, NB>>; NQ],
     next: usize,
     window: RecursiveEstimator<T, NB>,
     reference: RecursiveEstimator<T, NB>,
     comparison: WindowComparison<T, NB>,
     scatter: WindowScatter<T, NB>,
-    /// Nominal values plus this is the reference, while noise is learned.
+    /// Reference minus nominal values, while the noise is learned.
     correction: [T; NB],
-    /// Samples in this block.
+    /// Samples of the current block so far.
     samples: u32,
-    /// Blocks since the last comparison, with any drive in them: a window that stands is compared once.
+    /// Blocks with at least one drive since the last comparison, so that an unchanged window is compared only once.
     since: u32,
-    /// Blocks in this stage: of each drive, and with any drive in them.
+    /// Blocks of each drive in total, and blocks with at least one drive in this stage.
     counted: [u32; NQ],
     blocks: u32,
     watched: [bool; NQ],
     left_out: u64,
     verdict: WatchVerdict<T, NB>,
-    /// In how many comparisons the parameter of the verdict came out, one after the other.
+    /// Number of successive comparisons in which the parameter of the verdict changed most.
     same: u32,
 }
 
 impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
-    /// A watch that begins to learn; `nominal` are base parameters near the true ones, such as those that are in use.
+    /// A watch that starts to learn; `nominal` are base parameters near the true ones, such as those in use.
     ///
-    /// Options that make no sense are taken for the nearest that do.
+    /// Options out of range are replaced by the nearest ones that are possible.
     #[must_use]
     pub fn new(nominal: &[T; NB], options: &Options) -> Self {
         let plan = WatchSchedule::new(options, NB);
@@ -128,15 +137,15 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         }
     }
 
-    /// Takes a sample: the rows of `H_min`, one per drive, and the forces that the drives had at that time.
+    /// Adds a sample: the rows of `H_min`, one per drive, and the forces of the drives at that time.
     ///
-    /// A force that is no number (`NAN`) leaves its drive's block out, and so do rows; for drives that stand still, where
-    /// friction may be anything, and for forces that are not measured.
+    /// A force of `NAN` excludes the drive's block, as do rows with `NAN`. Use it for drives at standstill, where
+    /// friction is not determined, and for forces that are not measured.
     pub fn step(&mut self, rows: &[[T; NB]; NQ], forces: &[T; NQ]) -> &WatchVerdict<T, NB> {
         for ((drive, row), force) in self.drives.iter_mut().zip(rows).zip(forces) {
             drive.add_sample(row, *force);
         }
-        // As many per step as are done before the block ends.
+        // So many per step that all are added before the block ends.
         self.update_estimators(NQ.div_ceil(self.plan.block as usize));
         if self.comparison.is_busy() && self.comparison.advance() {
             self.finish_comparison();
@@ -150,12 +159,12 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         &self.verdict
     }
 
-    /// What was said last.
+    /// The verdict after the last sample.
     pub fn verdict(&self) -> &WatchVerdict<T, NB> {
         &self.verdict
     }
 
-    /// Takes what is now as right: the reference is learned anew, noise and scatter stay known.
+    /// Accepts the present state as correct: the reference is learned again, while noise and scatter stay known.
     pub fn accept(&mut self) {
         if self.stage == WatchStage::Noise {
             return;
@@ -168,17 +177,19 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         self.verdict = WatchVerdict::Learning;
     }
 
-    /// Base parameters as the window has them now; where it says nothing, those of the reference.
+    /// Base parameters estimated from the window; where it has no information, those of the reference.
     ///
-    /// Takes two copies of a triangle and `2 NB` rotations of rows: not for every cycle.
+    /// Works on two copies of an R factor and takes `2 NB` rotations of rows, so it is not meant for every cycle.
     #[must_use]
     pub fn estimate(&self) -> [T; NB] {
         let reference = self.reference.information();
         let ridge = |share: T| reference.map(|x| (share * x).sqrt());
+        // First the reference alone, as differences from the nominal values.
         let values = self.reference.solve(&EstimatorPrior {
             values: [T::from_f64(0.0); NB],
             weights: ridge(T::from_f64(RIDGE)),
         });
+        // The reference is then a weak prior for the window.
         let mut estimate = self.window.solve(&EstimatorPrior {
             values,
             weights: ridge(T::from_f64(REFERENCE_WEIGHT) / self.plan.windows),
@@ -189,18 +200,18 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         estimate
     }
 
-    /// Drives that are watched. Those that were hardly measured while the watch learned have no noise to hold a change
-    /// against; they are left out until a new watch is made.
+    /// Drives that are watched. A drive that was rarely measured while the watch learned has no known noise; it is
+    /// excluded until a new watch is made.
     pub fn watched_drives(&self) -> [bool; NQ] {
         self.watched
     }
 
-    /// Blocks of a drive that were left out because something in them was no number.
+    /// Number of blocks of a drive that were excluded because a number in them was NaN or too large.
     pub fn n_skipped_blocks(&self) -> u64 {
         self.left_out
     }
 
-    /// Turns the blocks of so many drives that wait into the triangles.
+    /// Adds the waiting blocks of at most so many drives to the estimators.
     fn update_estimators(&mut self, most: usize) {
         let changed = matches!(self.verdict, WatchVerdict::Changed(_));
         for waiting in self.waiting.iter_mut().skip(self.next).take(most) {
@@ -208,16 +219,16 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
             let Some(block) = waiting.take() else {
                 continue;
             };
-            // Blocks are finite.
+            // `add` can only reject numbers that are not finite, and blocks are finite.
             _ = self.window.add(block.row, block.value);
-            // What has changed is no reference.
+            // After a change the reference stays as it was.
             if !changed {
                 _ = self.reference.add(block.row, block.value);
             }
         }
     }
 
-    /// Takes the means of the block that ends, and looks whether it is time for a comparison or for the next stage.
+    /// Ends a block: takes its means, and checks whether the next comparison or stage is due.
     fn end_block(&mut self) {
         self.advance_stage();
         let share = self.plan.per_sample;
@@ -232,7 +243,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         };
         let n_counted = means.iter().flatten().count();
         self.left_out += (NQ - n_counted) as u64;
-        // Time stands still where nothing is measured.
+        // Nothing is forgotten while nothing is measured.
         if n_counted == 0 {
             return;
         }
@@ -251,7 +262,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
             };
             *counted = counted.saturating_add(1);
             *waiting = if self.stage == WatchStage::Noise {
-                // The first half is for the fit alone.
+                // Residuals count from the second half on; the first half only fits the parameters.
                 if *counted > self.plan.noise / 2 {
                     drive.add_residual(mean.residual(&self.correction));
                 }
@@ -263,7 +274,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         self.next = 0;
     }
 
-    /// Whether the noise is known: of all drives, or after twice the time of those that were measured.
+    /// Whether the noise of all drives is known; after twice the time, that of at least one.
     fn has_noise(&self) -> bool {
         let mut known = self.counted.iter().map(|n| *n >= self.plan.noise);
         if self.blocks >= self.plan.noise.saturating_mul(2) {
@@ -273,7 +284,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         }
     }
 
-    /// Goes on to the next stage, or begins a comparison, where it is time for it.
+    /// Enters the next stage, or starts a comparison, if it is due.
     fn advance_stage(&mut self) {
         match self.stage {
             WatchStage::Noise if self.has_noise() => {
@@ -302,6 +313,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         }
         self.since = 0;
         if self.stage == WatchStage::Noise {
+            // While the noise is learned, the reference is fitted instead of compared.
             let information = self.reference.information();
             self.correction = self.reference.solve(&EstimatorPrior {
                 values: [T::from_f64(0.0); NB],
@@ -312,7 +324,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         }
     }
 
-    /// Judges what a comparison has found.
+    /// Updates the verdict with the result of a comparison.
     fn finish_comparison(&mut self) {
         let singles = self.comparison.single_changes(&self.window.information());
         let found = match self.stage {
@@ -333,7 +345,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
             (WatchVerdict::Changed(_), None) => self.same = 0,
             (_, Some(change)) => {
                 self.verdict = WatchVerdict::Changed(change);
-                // A change that holds for part of a window only looks like one of other parameters.
+                // A change during part of a window looks like one of other parameters, so the window starts again.
                 self.window = RecursiveEstimator::new();
                 self.same = 0;
             }
@@ -341,7 +353,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         }
     }
 
-    /// The parameter whose change alone explains most, among those that changed by more than chance; none if none did.
+    /// The parameter whose change alone explains most, among those above their threshold; `None` if there is none.
     fn detect_change(&self, singles: &[ChangeScore<T>; NB]) -> Option<WatchChange<T, NB>> {
         let (parameter, single) = self.largest_change(singles)?;
         let gain = single.gain();
@@ -364,7 +376,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         })
     }
 
-    /// The largest gain of those that exceed what chance reaches.
+    /// The largest gain above the threshold of its parameter.
     fn largest_change(&self, singles: &[ChangeScore<T>; NB]) -> Option<(usize, ChangeScore<T>)> {
         let mut found: Option<(usize, ChangeScore<T>)> = None;
         for (k, single) in singles.iter().enumerate() {

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use modelmill_codegen::{Derivation, EmissionRequest, LANGUAGES};
+use modelmill_codegen::Derivation;
+use modelmill_emit::{EmissionRequest, LANGUAGES};
 
 use crate::models::{Motion, STATES};
 

@@ -95,7 +95,7 @@ fn generate(name: &str) -> Result<(), String> {
     let derivation =
         modelmill_codegen::derive(&loaded.mechanism).map_err(|error| error.to_string())?;
     let derived = run::processor_time();
-    black_box(modelmill_codegen::emit(&derivation).module());
+    black_box(modelmill_emit::emit(&derivation).module());
     let emitted = run::processor_time();
     for (stage, ns) in [
         ("load", read - start),

@@ -145,7 +145,7 @@ fn what_is_no_number_is_found_where_it_stands() {
         let text = result.unwrap_err().to_string();
         assert_eq!(
             text,
-            format!("at sample {at}: `q3` is no number, or too large to compute with")
+            format!("at sample {at}: `q3` is NaN, infinite or too large to compute with")
         );
     }
 }

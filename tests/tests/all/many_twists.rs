@@ -97,6 +97,6 @@ fn long_arms_are_grouped_link_by_link() {
     }
     case.reduction_keeps_the_forces().unwrap();
     case.forces_satisfy_dalembert_to(1e-9, 4).unwrap();
-    let module = modelmill_codegen::emit(&case.derivation).module();
+    let module = modelmill_emit::emit(&case.derivation).module();
     assert!(module.len() < 600_000, "{} bytes", module.len());
 }

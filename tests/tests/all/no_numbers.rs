@@ -1,6 +1,7 @@
 //! Values that are no finite numbers, and values that lead to such, are errors of the derivation that say which.
 
-use modelmill_codegen::{derive, emit};
+use modelmill_codegen::derive;
+use modelmill_emit::emit;
 use modelmill_spec::Mechanism;
 use modelmill_tests::fixtures::model;
 

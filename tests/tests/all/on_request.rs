@@ -21,7 +21,7 @@ macro_rules! check_reactions {
         let mechanism: Mechanism = $mechanism;
         let derivation = derive(&mechanism);
         let reactions = derivation.reactions().expect("loops can be solved");
-        let evaluator = Evaluator::new(&derivation);
+        let evaluator = ModelEvaluator::new(&derivation);
         let sample =
             Sample::random(&mechanism, 12, $reach, &mut Stream::new(3)).reachable(&evaluator);
         assert!(sample.len() > 5, "too few states");

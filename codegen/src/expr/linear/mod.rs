@@ -1,6 +1,6 @@
 //! Small linear systems of expressions, by cofactors, block by block.
 //!
-//! Blocks that are too large for that are torn apart first.
+//! Blocks that are too large for cofactors are torn apart first.
 //! No pivot is ever divided by except the determinant of a block, so that a regular system has no spurious singularity.
 
 mod cofactors;
@@ -23,6 +23,11 @@ pub(crate) struct LinearSolution {
 }
 
 /// Solves `matrix * x = rhs` for several right-hand sides (the columns of `rhs`).
+///
+/// `matrix` is square, one row per equation. `what` names the system in errors.
+///
+/// # Errors
+/// [`DeriveError::Singular`] if the form of the matrix is singular, [`DeriveError::TooLarge`] if a block is too large.
 pub(crate) fn solve(
     graph: &mut Graph,
     matrix: &[Vec<ExprId>],
@@ -37,8 +42,11 @@ pub(crate) fn solve(
         what: what.to_owned(),
     };
     let mut rhs = rhs.to_vec();
+    // Unknowns of all blocks so far.
     let mut solved: Vec<usize> = Vec::new();
+    // Blocks are solved in order: each one uses only unknowns of the blocks before it.
     for (rows, columns) in triangular_blocks(matrix).ok_or_else(singular)? {
+        // Known unknowns go to the right-hand side.
         for r in &rows {
             for k in 0..n_rhs {
                 let mut terms = vec![(rhs[*r][k], Rational::ONE)];
@@ -50,6 +58,7 @@ pub(crate) fn solve(
             }
         }
         solved.extend(&columns);
+        // The block's own square system.
         let block: Vec<Vec<ExprId>> = rows
             .iter()
             .map(|r| columns.iter().map(|c| matrix[*r][*c]).collect())
@@ -63,6 +72,7 @@ pub(crate) fn solve(
                         size: rows.len(),
                         limit: LARGEST_BLOCK,
                     })?;
+                // Indices above 1 are expressions; the number 1 cannot vanish.
                 determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
                 found
             } else {
@@ -87,6 +97,7 @@ pub(crate) fn solve(
 /// (Dulmage and Mendelsohn 1963). `None` if no choice of one entry per row and column avoids zeros.
 fn triangular_blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usize>)>> {
     let n = matrix.len();
+    // Positions of the entries of a row that are not exactly zero.
     let entries = |i: usize| (0..n).filter(move |j| matrix[i][*j] != Graph::ZERO);
     let mut bipartite = UnGraph::<(), ()>::default();
     let nodes: Vec<_> = (0..2 * n).map(|_| bipartite.add_node(())).collect();
@@ -95,10 +106,12 @@ fn triangular_blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usiz
             bipartite.add_edge(nodes[i], nodes[n + j], ());
         }
     }
+    // Matching: each row gets a column of its own in which it is not zero.
     let matching = maximum_matching(&bipartite);
     let column_of: Vec<usize> = (0..n)
         .map(|i| matching.mate(nodes[i]).map(|j| j.index() - n))
         .collect::<Option<_>>()?;
+    // Directed graph of the rows: row i needs the unknown that row k determines.
     let mut needs = DiGraph::<(), ()>::default();
     let rows: Vec<_> = (0..n).map(|_| needs.add_node(())).collect();
     for i in 0..n {
@@ -108,7 +121,7 @@ fn triangular_blocks(matrix: &[Vec<ExprId>]) -> Option<Vec<(Vec<usize>, Vec<usiz
             }
         }
     }
-    // Components come with what they need before them.
+    // Strongly connected components come after the components that they need.
     let blocks = tarjan_scc(&needs).into_iter().map(|component| {
         let mut rows: Vec<usize> = component.into_iter().map(NodeIndex::index).collect();
         let mut columns: Vec<usize> = rows.iter().map(|i| column_of[*i]).collect();

@@ -1,22 +1,24 @@
-//! Linear systems of legs that share a platform: too large for cofactors at once, small once they are torn apart.
+//! Linear systems of legs that share a platform: too large for cofactors at once, small after they are torn apart.
 //!
-//! Without the columns that tie everything together, such as the rates of a platform, a system falls into parts with more
-//! rows than columns. A part with one row too many has one combination of its rows in which its own unknowns cancel; its
-//! factors are the part's maximal minors. These combinations make up a small system for the columns that were torn out,
-//! and every part follows by least squares, which here are exact and divide by a sum of squares: a part is singular only
-//! where its own unknowns are not determined. (Tearing: Kron 1963.)
+//! Without the columns that tie everything together, such as the rates of a platform, a system falls into parts with
+//! more rows than columns. A part with one row too many has one combination of its rows in which its own unknowns
+//! cancel; its factors are the part's maximal minors. These combinations make up a small system for the columns that
+//! were torn out, and every part follows by least squares, which here are exact and divide by a sum of squares: a part
+//! is singular only where its own unknowns are not determined. (Tearing: Kron 1963.)
 
 use super::cofactors::{LARGEST_BLOCK, determinant, solve_by_cofactors};
 use crate::expr::{ExprId, Graph, Rational};
 
-/// Rows and columns that hang together without the torn columns.
+/// Rows and columns that remain connected without the torn columns.
 struct ConnectedBlock {
+    /// Indices of the rows, in increasing order.
     rows: Vec<usize>,
+    /// Indices of the columns, in increasing order.
     columns: Vec<usize>,
 }
 
-/// Solves `matrix * x = rhs`: one row of values per unknown, then what must not vanish. `None` where the system does not
-/// fall apart this way, or is singular.
+/// Solves `matrix * x = rhs`: returns one row of values per unknown, then the determinants that must not vanish. `None`
+/// where the system cannot be torn apart this way, or is singular.
 pub(crate) fn solve_by_tearing(
     graph: &mut Graph,
     matrix: &[Vec<ExprId>],
@@ -25,6 +27,7 @@ pub(crate) fn solve_by_tearing(
     let (torn, parts) = tear(matrix)?;
     let (n, n_rhs) = (matrix.len(), rhs.first().map_or(0, Vec::len));
     let mut determinants = Vec::new();
+    // The small system: combinations of rows in which all columns but the torn ones cancel.
     let (mut small, mut small_rhs) = (Vec::new(), Vec::new());
     for part in &parts {
         let combinations = cancelling_rows(graph, matrix, part);
@@ -48,12 +51,14 @@ pub(crate) fn solve_by_tearing(
             );
         }
     }
+    // Its solution gives the torn unknowns.
     let (of_torn, determinant) = solve_by_cofactors(graph, &small, &small_rhs)?;
     determinants.push(determinant);
     let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
     for (column, value) in torn.iter().zip(of_torn) {
         values[*column] = value;
     }
+    // With these on the right-hand side, each part is solved on its own.
     for part in parts.iter().filter(|part| !part.columns.is_empty()) {
         let rest: Vec<Vec<ExprId>> = part
             .rows
@@ -76,6 +81,7 @@ pub(crate) fn solve_by_tearing(
             .iter()
             .map(|row| part.columns.iter().map(|c| matrix[*row][*c]).collect())
             .collect();
+        // A part with one row more than columns is solved by its normal equations.
         let (own, rest) = if part.rows.len() == part.columns.len() {
             (own, rest)
         } else {
@@ -93,7 +99,7 @@ pub(crate) fn solve_by_tearing(
     Some((values, determinants))
 }
 
-/// The fewest columns, those of most rows first, without which the others fall into parts that can be solved.
+/// The fewest columns to tear out, those with the most rows first, so that the remaining parts can be solved.
 fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<ConnectedBlock>)> {
     let n = matrix.len();
     let mut order: Vec<usize> = (0..n).collect();
@@ -102,6 +108,7 @@ fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<ConnectedBlock>)> {
     (1..=LARGEST_BLOCK.min(n)).find_map(|k| {
         let (torn, rest) = order.split_at(k);
         let parts = connected_blocks(matrix, rest);
+        // A part is solvable with as many rows as columns or one more, or if it has no columns of its own.
         let is_fine = parts.iter().all(|part| {
             let (r, c) = (part.rows.len(), part.columns.len());
             c <= LARGEST_BLOCK && (r == c || r == c + 1 || c == 0)
@@ -123,6 +130,7 @@ fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedB
             rows: vec![row],
             columns: own,
         };
+        // Parts that share a column with this row become one part with it.
         let (touching, others) = parts.into_iter().partition(|part: &ConnectedBlock| {
             part.columns.iter().any(|c| joined.columns.contains(c))
         });
@@ -140,12 +148,13 @@ fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedB
     parts
 }
 
-/// Combinations of a part's rows, as rows with factors, in which its own columns cancel.
+/// Combinations of a part's rows, as pairs of a row and its factor, in which the part's own columns cancel.
 fn cancelling_rows(
     graph: &mut Graph,
     matrix: &[Vec<ExprId>],
     part: &ConnectedBlock,
 ) -> Vec<Vec<(usize, ExprId)>> {
+    // Rows without own columns are equations of the torn unknowns already.
     if part.columns.is_empty() {
         return part
             .rows
@@ -153,9 +162,11 @@ fn cancelling_rows(
             .map(|row| vec![(*row, Graph::ONE)])
             .collect();
     }
+    // A square part only determines its own unknowns.
     if part.rows.len() == part.columns.len() {
         return Vec::new();
     }
+    // One row too many: the signed maximal minors are the factors of the combination.
     let factors = part
         .rows
         .iter()
@@ -175,7 +186,7 @@ fn cancelling_rows(
     vec![factors]
 }
 
-/// `a' b`
+/// The matrix product of the transpose of `a` with `b`; both have the same number of rows.
 fn transposed_times(graph: &mut Graph, a: &[Vec<ExprId>], b: &[Vec<ExprId>]) -> Vec<Vec<ExprId>> {
     let (n, m) = (a.first().map_or(0, Vec::len), b.first().map_or(0, Vec::len));
     (0..n)

@@ -1,4 +1,6 @@
 //! Formulas of the exact expressions that a model file is written in.
+//!
+//! An exact expression of a mechanism goes in; a formula with the names of the file comes out.
 
 use modelmill_spec::{
     ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism,
@@ -10,6 +12,7 @@ use super::symbol::FormulaSymbol;
 use crate::expr::Rational;
 
 /// The formula of an exact expression.
+// Outside of effects the names of places do not occur.
 pub fn exact_formula(mechanism: &Mechanism, expression: &ExactExpression) -> PrintedFormula {
     exact_formula_at(mechanism, expression, ["x", "other"])
 }
@@ -21,6 +24,7 @@ pub fn exact_formula_at(
     expression: &ExactExpression,
     places: [&str; 2],
 ) -> PrintedFormula {
+    // Formula of an operand.
     let of = |inner: &ExactExpression| exact_formula_at(mechanism, inner, places);
     match expression {
         ExactExpression::Rational(value) => PrintedFormula::Number(Rational::from(value.clone())),
@@ -35,6 +39,7 @@ pub fn exact_formula_at(
         ExactExpression::Quotient(above, below) => PrintedFormula::quotient(of(above), of(below)),
         ExactExpression::Negative(inner) => of(inner).negate(),
         ExactExpression::Power(base, n) => of(base).power(*n),
+        // Both crates have an enumeration of functions.
         ExactExpression::Apply(function, inner) => {
             let function = match function {
                 FileFunction::Sin => FormulaFunction::Sin,
@@ -52,10 +57,12 @@ pub fn exact_formula_at(
 
 /// The formula of an angle.
 pub fn angle_formula(mechanism: &Mechanism, angle: &ExactAngle) -> PrintedFormula {
+    // The constant part, as a multiple of pi.
     let turns = PrintedFormula::product(
         Rational::from(angle.pi.clone()),
         [PrintedFormula::name("pi")],
     );
+    // Coordinates and constants with their integer factors.
     let terms = angle.terms.iter().map(|(symbol, n)| {
         let symbol = PrintedFormula::Symbol(symbol_name(mechanism, *symbol, ["x", "other"]));
         PrintedFormula::product(Rational::integer(i64::from(*n)), [symbol])
@@ -65,6 +72,7 @@ pub fn angle_formula(mechanism: &Mechanism, angle: &ExactAngle) -> PrintedFormul
 
 /// The formula of a length.
 pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFormula {
+    // Prismatic coordinates with their factors.
     let slides = length.coordinates.iter().map(|(i, k)| {
         let name = PrintedFormula::name(&*mechanism.coordinates[i.0].name);
         PrintedFormula::product(Rational::from(k.clone()), [name])
@@ -76,12 +84,14 @@ pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFor
     )
 }
 
+/// The printed name of a symbol of the model file; `x` and `other` name the quantities of an effect's two places.
 fn symbol_name(
     mechanism: &Mechanism,
     symbol: modelmill_spec::ModelSymbol,
     [x, other]: [&str; 2],
 ) -> FormulaSymbol {
     use modelmill_spec::ModelSymbol as Named;
+    // Rates and accelerations of places get the suffixes `_d` and `_dd`.
     match symbol {
         Named::Constant(i) => FormulaSymbol::new(&*mechanism.constants[i.0].name),
         Named::Parameter(i) => FormulaSymbol::new(&*mechanism.parameters[i.0].name),

@@ -1,4 +1,6 @@
 //! Formulas of the expressions in a graph.
+//!
+//! The graph shares subexpressions, but a formula is a tree, so shared subexpressions are repeated.
 
 use modelmill_spec::Mechanism;
 
@@ -21,8 +23,9 @@ pub fn atom(mechanism: &Mechanism, atom: Atom) -> FormulaSymbol {
     }
 }
 
-/// The formula of an expression, written out as a tree: ask [`tree_size`] first where it may be large.
+/// The formula of an expression, written out as a tree. Check [`tree_size`] first where the tree may be large.
 pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormula {
+    // Formula of an operand.
     let of = |id: ExprId| formula(graph, mechanism, id);
     match graph.node(id) {
         Node::Rational(value) => PrintedFormula::Number(value.clone()),
@@ -33,12 +36,14 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
         Node::Cos(angle) => {
             PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle))
         }
+        // Every term with its rational factor.
         Node::Sum(terms) => PrintedFormula::sum(
             terms
                 .iter()
                 .map(|(term, k)| PrintedFormula::product(k.clone(), [of(*term)])),
         ),
         Node::Product(factors) => {
+            // Factors are printed in the order that a person would write, not in the order of their ids.
             let mut factors = factors.clone();
             factors.sort_by_key(|(id, _)| factor_rank(graph, *id));
             let product = PrintedFormula::product(
@@ -51,8 +56,9 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
     }
 }
 
-/// How many nodes the expression has when it is written out, counted no further than `limit`.
+/// Number of nodes of the expression when it is written out as a tree, counted up to `limit`.
 pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
+    // Nodes that are waiting to be counted; shared nodes are counted as often as they occur.
     let mut size = 0;
     let mut left = vec![id];
     while let Some(next) = left.pop() {
@@ -65,8 +71,9 @@ pub fn tree_size(graph: &Graph, id: ExprId, limit: usize) -> usize {
     size
 }
 
-/// A sum of angles.
+/// The formula of a sum of angles, without its constant part.
 pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> PrintedFormula {
+    // Each atom with its integer factor.
     PrintedFormula::sum(angle.terms().iter().map(|(a, n)| {
         PrintedFormula::product(
             Rational::integer(i64::from(*n)),
@@ -75,7 +82,7 @@ pub(crate) fn angle_sum_formula(mechanism: &Mechanism, angle: &AtomAngleSum) -> 
     }))
 }
 
-/// Place of a factor in a product: known quantities first, then what moves, then functions and parentheses.
+/// Rank of a factor in a product: constants and parameters first, then variables, then functions and parentheses.
 fn factor_rank(graph: &Graph, id: ExprId) -> usize {
     match graph.node(id) {
         Node::Rational(_) => 0,
@@ -90,6 +97,7 @@ fn factor_rank(graph: &Graph, id: ExprId) -> usize {
 
 /// Orders the factors that came out of nested products: names, functions, parentheses.
 fn order_factors(product: PrintedFormula) -> PrintedFormula {
+    // Names come before functions, functions before parentheses.
     fn printed_rank(factor: &PrintedFormula) -> usize {
         match factor {
             PrintedFormula::Apply(..) => 1,

@@ -1,4 +1,6 @@
 //! Formulas as LaTeX, for amsmath.
+//!
+//! A [`PrintedFormula`] goes in; text for a math environment comes out.
 
 use std::fmt::Write;
 
@@ -18,16 +20,20 @@ impl PrintedFormula {
 impl FormulaSymbol {
     /// As LaTeX: `\dot{\theta}_{1}`.
     pub fn latex(&self) -> String {
+        // The name is split into its letter or word and the parts of its index.
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
+        // A word stands upright, with the dots above it.
         if matches!(set.base, GlyphRun::Word(_)) {
             base = format!("\\mathrm{{{}}}", inner(&set.base));
         }
+        // Time derivatives are dots above the letter.
         match self.order {
             0 => {}
             1 => base = format!("\\dot{{{base}}}"),
             _ => base = format!("\\ddot{{{base}}}"),
         }
+        // Parts of the index are separated by commas.
         let parts: Vec<String> = set
             .index
             .iter()
@@ -41,6 +47,7 @@ impl FormulaSymbol {
     }
 }
 
+/// The text of a glyph run in math mode, without a font command.
 fn inner(glyphs: &GlyphRun) -> String {
     match glyphs {
         GlyphRun::Greek(command, _) => format!("\\{command}"),
@@ -48,6 +55,7 @@ fn inner(glyphs: &GlyphRun) -> String {
     }
 }
 
+/// A glyph run in its font: words upright, all else in math italics.
 fn glyphs(one: &GlyphRun) -> String {
     match one {
         GlyphRun::Word(text) => format!("\\mathrm{{{text}}}"),
@@ -55,8 +63,9 @@ fn glyphs(one: &GlyphRun) -> String {
     }
 }
 
-/// Writes a formula; `tight` asks for parentheses around what is not a single factor.
+/// Writes a formula. With `tight`, sums and negative numbers or terms are put into parentheses.
 fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
+    // Only sums and signs need parentheses in a product; fractions and roots enclose themselves.
     let enclosed = tight
         && match formula {
             PrintedFormula::Sum(_) => true,
@@ -79,6 +88,7 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
             _ = write!(out, "{}_{{{}}}", symbol.latex(), index.latex());
         }
         PrintedFormula::Sum(terms) => {
+            // Each term's sign is written here, so only its magnitude follows.
             for (i, term) in terms.iter().enumerate() {
                 match (i, term.is_negative()) {
                     (0, true) => out.push('-'),
@@ -103,7 +113,9 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
     }
 }
 
+/// Writes a power: the exponent stands behind the name of sine, cosine and tanh, and behind the base otherwise.
 fn power(out: &mut String, base: &PrintedFormula, n: u32) {
+    // Where the exponent stands depends on the base.
     match base {
         PrintedFormula::Apply(
             f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
@@ -115,25 +127,30 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
             write(out, base, true);
             _ = write!(out, "^{{{n}}}");
         }
+        // Braces keep the exponent outside the root or the bars.
         PrintedFormula::Apply(FormulaFunction::Sqrt | FormulaFunction::Abs, _) => {
             out.push('{');
             write(out, base, true);
             _ = write!(out, "}}^{{{n}}}");
         }
+        // All other bases get parentheses.
         other => {
             _ = write!(out, "\\left({}\\right)^{{{n}}}", other.latex());
         }
     }
 }
 
+/// Writes a function with its operands; an exponent stands behind the function's name.
 fn apply(
     out: &mut String,
     function: FormulaFunction,
     exponent: Option<u32>,
     operands: &[PrintedFormula],
 ) {
+    // Operands are separated by commas.
     let arguments: Vec<String> = operands.iter().map(PrintedFormula::latex).collect();
     let arguments = arguments.join(", ");
+    // Roots and absolute values enclose their operand; all others have a command before it.
     let command = match function {
         FormulaFunction::Sqrt => {
             _ = write!(out, "\\sqrt{{{arguments}}}");
@@ -150,10 +167,12 @@ fn apply(
         FormulaFunction::Sign => "\\operatorname{sign}",
         FormulaFunction::Atan2 => "\\operatorname{atan2}",
     };
+    // The exponent belongs to the function's name, as in sin^2.
     out.push_str(command);
     if let Some(n) = exponent {
         _ = write!(out, "^{{{n}}}");
     }
+    // A sine or cosine of one name needs no parentheses.
     match operands {
         [PrintedFormula::Symbol(_)]
             if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
@@ -164,8 +183,10 @@ fn apply(
     }
 }
 
+/// Writes a number or a term without its sign.
 fn magnitude(out: &mut String, formula: &PrintedFormula) {
     match formula {
+        // Fractions of numbers stand above each other.
         PrintedFormula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "\\frac{{{n}}}{{{d}}}"),
             (n, None) => out.push_str(&n),
@@ -176,8 +197,10 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
             below,
         } => {
             let (n, d) = digits(factor);
+            // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
                 out.push_str(&product_line(&n, above, true));
+            // The sign is written by the caller; numbers go into the numerator and the denominator.
             } else {
                 let one = Rational::ONE.to_string();
                 let d = d.unwrap_or(one);
@@ -193,17 +216,20 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
     }
 }
 
-/// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
+/// A product on one line. `tight` encloses sums; on the line of a fraction a single factor needs no parentheses.
 fn product_line(number: &str, factors: &[PrintedFormula], tight: bool) -> String {
+    // The number 1 is written only if nothing else is on the line.
     let mut parts = Vec::new();
     if number != "1" || factors.is_empty() {
         parts.push(number.to_owned());
     }
+    // A single factor on the line of a fraction needs no parentheses.
     let alone = !tight && parts.is_empty() && factors.len() == 1;
     for factor in factors {
         let mut text = String::new();
         write(&mut text, factor, !alone);
         parts.push(text);
     }
+    // Thin spaces separate the factors.
     parts.join(" \\, ")
 }

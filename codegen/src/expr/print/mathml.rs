@@ -1,4 +1,7 @@
 //! Formulas as presentation MathML, readable by any browser without scripts.
+//!
+//! A [`PrintedFormula`] goes in. The content of one `math` element comes out, or of several between which lines may
+//! end.
 
 use std::fmt::Write;
 
@@ -15,8 +18,8 @@ impl PrintedFormula {
         format!("<mrow>{}</mrow>", out.text)
     }
 
-    /// As the contents of `math` elements, one after the other, between which a line may end: before each sign of a sum, those
-    /// in parentheses too. What cannot be parted otherwise, a long fraction or root, is written on the line.
+    /// As the contents of consecutive `math` elements. A line may end between them: before each sign of a sum, also of
+    /// sums in parentheses. A long fraction or root, which cannot be split otherwise, is written on the line.
     pub fn mathml_segments(&self) -> Vec<String> {
         let mut out = MathmlWriter {
             may_part: true,
@@ -31,39 +34,42 @@ impl PrintedFormula {
     }
 }
 
-/// Letters of text beyond which a fraction or a root is written on the line where lines may end.
+/// Letters of text above which a fraction or a root is written on the line, where lines may end.
 const LONG: usize = 32;
 
-/// MathML as it grows.
+/// MathML that is being written, in segments between which a line may end.
 #[derive(Default)]
 struct MathmlWriter {
-    /// Stretches that ended.
+    /// Complete segments.
     done: Vec<String>,
+    /// The current segment.
     text: String,
     /// Whether a line may end here.
     may_part: bool,
 }
 
 impl MathmlWriter {
+    /// Appends to the current segment.
     fn push_str(&mut self, text: &str) {
         self.text.push_str(text);
     }
 
-    /// A line may end here.
+    /// Ends the current segment, if lines may end here.
     fn end_segment(&mut self) {
         if self.may_part && !self.text.is_empty() {
             self.done.push(std::mem::take(&mut self.text));
         }
     }
 
-    /// Writes what must stay together.
+    /// Writes a part in which no line may end.
     fn write_unbroken(&mut self, write: impl FnOnce(&mut Self)) {
+        // The permission to end lines is restored afterwards.
         let may_part = std::mem::replace(&mut self.may_part, false);
         write(self);
         self.may_part = may_part;
     }
 
-    /// Whether something is to be written on the line, since it would be too wide in one piece.
+    /// Whether a formula is written on the line because it would be too wide in one piece.
     fn is_too_wide(&self, formula: &PrintedFormula) -> bool {
         self.may_part && formula.text().chars().count() > LONG
     }
@@ -76,7 +82,7 @@ impl Write for MathmlWriter {
     }
 }
 
-/// Space between factors; the sign of the product stays invisible.
+/// Invisible multiplication sign with a space before the next factor.
 const TIMES: &str = "<mo lspace=\"0\" rspace=\"0.12em\">&#x2062;</mo>";
 
 impl FormulaSymbol {
@@ -85,7 +91,7 @@ impl FormulaSymbol {
         self.mathml_power(None)
     }
 
-    /// With an exponent above the index.
+    /// As a MathML element with an exponent above the index.
     fn mathml_power(&self, exponent: Option<u32>) -> String {
         let set = typeset(&self.name);
         let mut base = glyphs(&set.base);
@@ -97,18 +103,21 @@ impl FormulaSymbol {
         } {
             base = format!("<mover>{base}<mo scriptlevel=\"0\">{dots}</mo></mover>");
         }
+        // Without an index the exponent belongs to the letter.
         if set.index.is_empty() {
             return match exponent {
                 Some(n) => format!("<msup>{base}<mn>{n}</mn></msup>"),
                 None => base,
             };
         }
+        // Parts of the index are separated by commas.
         let parts: Vec<String> = set
             .index
             .iter()
             .map(|part| part.iter().map(glyphs).collect::<String>())
             .collect();
         let index = parts.join("<mo lspace=\"0\" rspace=\"0\">,</mo>");
+        // With an index, the exponent stands above it.
         match exponent {
             Some(n) => format!("<msubsup>{base}<mrow>{index}</mrow><mn>{n}</mn></msubsup>"),
             None => format!("<msub>{base}<mrow>{index}</mrow></msub>"),
@@ -116,6 +125,7 @@ impl FormulaSymbol {
     }
 }
 
+/// A glyph run as a MathML element: digits as a number, letters as identifiers.
 fn glyphs(one: &GlyphRun) -> String {
     match one {
         GlyphRun::Greek(_, letter) => format!("<mi>{letter}</mi>"),
@@ -123,11 +133,12 @@ fn glyphs(one: &GlyphRun) -> String {
             format!("<mn>{text}</mn>")
         }
         GlyphRun::Italic(text) if text.chars().count() == 1 => format!("<mi>{}</mi>", escape(text)),
-        // Several letters stand upright by themselves.
+        // MathML draws identifiers of several letters upright.
         GlyphRun::Italic(text) | GlyphRun::Word(text) => format!("<mi>{}</mi>", escape(text)),
     }
 }
 
+/// Writes a body between two fences, such as parentheses.
 fn write_fenced(
     out: &mut MathmlWriter,
     open: &str,
@@ -137,6 +148,7 @@ fn write_fenced(
     write_fenced_power(out, open, close, None, body);
 }
 
+/// Writes a body between two fences, with an exponent behind the closing one.
 fn write_fenced_power(
     out: &mut MathmlWriter,
     open: &str,
@@ -145,7 +157,7 @@ fn write_fenced_power(
     body: impl FnOnce(&mut MathmlWriter),
 ) {
     if out.may_part {
-        // Both parentheses may come into stretches of their own.
+        // Both parentheses may get into different segments, so they must not stretch.
         _ = write!(out, "<mo form=\"prefix\" stretchy=\"false\">{open}</mo>");
         body(out);
         let close = format!("<mo form=\"postfix\" stretchy=\"false\">{close}</mo>");
@@ -155,6 +167,7 @@ fn write_fenced_power(
         }
         return;
     }
+    // In one piece the exponent applies to the complete parenthesis.
     if exponent.is_some() {
         out.push_str("<msup>");
     }
@@ -166,7 +179,9 @@ fn write_fenced_power(
     }
 }
 
+/// Writes a formula. With `tight`, sums and negative numbers or terms are put into parentheses.
 fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
+    // Only sums and signs need parentheses in a product.
     let enclosed = tight
         && match formula {
             PrintedFormula::Sum(_) => true,
@@ -185,15 +200,17 @@ fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
         }
         PrintedFormula::Sum(terms) => {
             for (i, term) in terms.iter().enumerate() {
+                // A line may end before every sign but the first.
                 if i > 0 {
                     out.end_segment();
                 }
-                // What begins a line keeps its distance from its sign.
+                // The sign at the beginning of a line keeps its distance from the term.
                 let sides = match i {
                     0 => " form=\"prefix\"",
                     _ if out.may_part => " form=\"infix\" lspace=\"0\" rspace=\"0.22em\"",
                     _ => "",
                 };
+                // Each term's sign is written here, so only its magnitude follows.
                 match (i, term.is_negative()) {
                     (_, true) => _ = write!(out, "<mo{sides}>&#x2212;</mo>"),
                     (0, false) => {}
@@ -213,6 +230,7 @@ fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
     }
 }
 
+/// Writes a power: the exponent stands behind the name of sine, cosine and tanh, and behind the base otherwise.
 fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
     match base {
         PrintedFormula::Apply(
@@ -222,6 +240,7 @@ fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml_power(Some(n))),
+        // Indices and bars stay in one piece with their exponent.
         PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out
             .write_unbroken(|out| {
                 out.push_str("<msup><mrow>");
@@ -232,12 +251,14 @@ fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
     }
 }
 
+/// Writes a function with its operands; an exponent stands behind the function's name.
 fn apply(
     out: &mut MathmlWriter,
     function: FormulaFunction,
     exponent: Option<u32>,
     operands: &[PrintedFormula],
 ) {
+    // Operands are separated by commas.
     let arguments = |out: &mut MathmlWriter| {
         for (i, operand) in operands.iter().enumerate() {
             if i > 0 {
@@ -247,6 +268,7 @@ fn apply(
         }
     };
     match function {
+        // A wide root is written as a root sign before parentheses, in which a line may end.
         FormulaFunction::Sqrt if operands.iter().any(|one| out.is_too_wide(one)) => {
             out.push_str("<mo form=\"prefix\" stretchy=\"false\">&#x221A;</mo>");
             write_fenced(out, "(", ")", arguments);
@@ -260,6 +282,7 @@ fn apply(
             });
             return;
         }
+        // Bars enclose the operand of an absolute value.
         FormulaFunction::Abs => {
             write_fenced(out, "|", "|", arguments);
             return;
@@ -267,10 +290,12 @@ fn apply(
         _ => {}
     }
     let name = format!("<mi>{}</mi>", function.name());
+    // The exponent belongs to the function's name, as in sin^2.
     match exponent {
         Some(n) => _ = write!(out, "<msup>{name}<mn>{n}</mn></msup>"),
         None => out.push_str(&name),
     }
+    // A sine or cosine of one name needs no parentheses.
     match operands {
         [PrintedFormula::Symbol(_)]
             if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
@@ -285,8 +310,10 @@ fn apply(
     }
 }
 
+/// Writes a number or a term without its sign, as a fraction where it has a denominator.
 fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
     match formula {
+        // Fractions of numbers stand above each other.
         PrintedFormula::Number(n) => match digits(n) {
             (n, Some(d)) => _ = write!(out, "<mfrac><mn>{n}</mn><mn>{d}</mn></mfrac>"),
             (n, None) => _ = write!(out, "<mn>{n}</mn>"),
@@ -297,13 +324,16 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
             below,
         } => {
             let (n, d) = digits(factor);
+            // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
                 write_product_line(out, &n, above, true);
             } else if out.is_too_wide(formula) {
+                // A wide fraction is written on the line with a slash.
                 write_product_line(out, &n, above, true);
                 out.end_segment();
                 out.push_str("<mo form=\"infix\" stretchy=\"false\">/</mo>");
                 let d = d.as_deref().unwrap_or("1");
+                // Several factors below the line need parentheses.
                 let is_one = below.len() + usize::from(d != "1") == 1;
                 if is_one {
                     write_product_line(out, d, below, true);
@@ -311,6 +341,7 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
                     write_fenced(out, "(", ")", |out| write_product_line(out, d, below, true));
                 }
             } else {
+                // A narrow fraction has a line between numerator and denominator.
                 out.write_unbroken(|out| {
                     out.push_str("<mfrac><mrow>");
                     write_product_line(out, &n, above, false);
@@ -324,17 +355,19 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
     }
 }
 
-/// A product on one line; a fraction's line encloses what stands alone on it, other products are `tight`.
+/// A product on one line. `tight` encloses sums; on the line of a fraction a single factor needs no parentheses.
 fn write_product_line(
     out: &mut MathmlWriter,
     number: &str,
     factors: &[PrintedFormula],
     tight: bool,
 ) {
+    // The number 1 is written only if nothing else is on the line.
     let with_number = number != "1" || factors.is_empty();
     if with_number {
         _ = write!(out, "<mn>{number}</mn>");
     }
+    // A single factor on the line of a fraction needs no parentheses.
     let alone = !tight && !with_number && factors.len() == 1;
     for (i, factor) in factors.iter().enumerate() {
         if i > 0 || with_number {

@@ -1,24 +1,33 @@
-//! Reads printed text again, for tests: a formula means what its text says.
+//! Reads printed text again, for tests: the text of a formula has the formula's value.
 
 use std::collections::BTreeMap;
 
 use crate::expr::{Atom, AtomAngleSum, EvaluationDomain, Rational, Unary};
 
-/// What was read.
+/// The tree of a text that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ParsedFormula {
+    /// A decimal or an integer, exact.
     Number(Rational),
+    /// A symbol.
     Name(String),
+    /// `a + b`
     Add(Box<ParsedFormula>, Box<ParsedFormula>),
+    /// `a - b`
     Sub(Box<ParsedFormula>, Box<ParsedFormula>),
+    /// `a * b`
     Mul(Box<ParsedFormula>, Box<ParsedFormula>),
+    /// `a / b`
     Div(Box<ParsedFormula>, Box<ParsedFormula>),
+    /// `-a`
     Negative(Box<ParsedFormula>),
+    /// An integer power.
     Power(Box<ParsedFormula>, i32),
+    /// A function by name, with its operands.
     Apply(String, Vec<ParsedFormula>),
 }
 
-/// Reads a whole text; panics with the text where it cannot.
+/// Reads a complete text; panics with the text where it cannot be read.
 pub(crate) fn parse(text: &str) -> ParsedFormula {
     let mut reader = FormulaReader {
         text,
@@ -33,12 +42,16 @@ pub(crate) fn parse(text: &str) -> ParsedFormula {
     read
 }
 
+/// A text and the part of it that is not read yet.
 struct FormulaReader<'a> {
+    /// The complete text, for messages.
     text: &'a str,
+    /// The part that is not read yet, without leading spaces.
     rest: &'a str,
 }
 
 impl FormulaReader<'_> {
+    /// Reads one character if it comes next, and returns whether it did.
     fn take(&mut self, wanted: char) -> bool {
         let found = self.rest.starts_with(wanted);
         if found {
@@ -47,6 +60,7 @@ impl FormulaReader<'_> {
         found
     }
 
+    /// Reads one character, which must come next.
     fn expect(&mut self, wanted: char) {
         assert!(
             self.take(wanted),
@@ -56,6 +70,7 @@ impl FormulaReader<'_> {
         );
     }
 
+    /// Reads the longest word of characters that belong to it.
     fn word(&mut self, belongs: fn(char) -> bool) -> String {
         let end = self.rest.find(|c| !belongs(c)).unwrap_or(self.rest.len());
         let (word, rest) = self.rest.split_at(end);
@@ -64,6 +79,7 @@ impl FormulaReader<'_> {
         word
     }
 
+    /// Reads terms with `+` and `-`.
     fn sum(&mut self) -> ParsedFormula {
         let mut total = if self.take('-') {
             ParsedFormula::Negative(Box::new(self.product()))
@@ -81,6 +97,7 @@ impl FormulaReader<'_> {
         }
     }
 
+    /// Reads factors with `*` and `/`, from left to right.
     fn product(&mut self) -> ParsedFormula {
         let mut total = self.power();
         loop {
@@ -94,6 +111,7 @@ impl FormulaReader<'_> {
         }
     }
 
+    /// Reads an operand with an optional exponent.
     fn power(&mut self) -> ParsedFormula {
         let base = self.operand();
         if self.take('^') {
@@ -103,6 +121,7 @@ impl FormulaReader<'_> {
         base
     }
 
+    /// Reads a sum in parentheses, a number, a name or a function.
     fn operand(&mut self) -> ParsedFormula {
         if self.take('(') {
             let inner = self.sum();
@@ -111,6 +130,7 @@ impl FormulaReader<'_> {
         }
         if self.rest.starts_with(|c: char| c.is_ascii_digit()) {
             let digits = self.word(|c| c.is_ascii_digit() || c == '.');
+            // A decimal is read exactly, as an integer over a power of ten.
             let (whole, fraction) = digits.split_once('.').unwrap_or((&digits, ""));
             let places = u32::try_from(fraction.len()).expect("few places");
             let all: num_bigint::BigInt = format!("{whole}{fraction}").parse().expect("digits");
@@ -125,6 +145,7 @@ impl FormulaReader<'_> {
             self.text,
             self.rest
         );
+        // A name with a parenthesis is a function.
         if !self.take('(') {
             return ParsedFormula::Name(name);
         }
@@ -138,7 +159,7 @@ impl FormulaReader<'_> {
 }
 
 impl ParsedFormula {
-    /// Its value in floating point; unknown names panic.
+    /// Its value in double precision; panics at unknown names.
     pub(crate) fn value_f64(&self, names: &BTreeMap<String, f64>) -> f64 {
         let of = |r: &Self| r.value_f64(names);
         match self {
@@ -170,13 +191,14 @@ impl ParsedFormula {
         }
     }
 
-    /// Its value in any domain; `None` where it has none.
+    /// Its value in any domain; `None` where it does not exist. Names must be in `names`.
     pub(crate) fn value<D: EvaluationDomain>(
         &self,
         domain: &D,
         names: &BTreeMap<String, Atom>,
     ) -> Option<D::Value> {
         let of = |r: &Self| r.value(domain, names);
+        // k times a value of the domain.
         let scaled =
             |a: D::Value, k: i64| Some(domain.mul(&domain.rational(&Rational::integer(k))?, &a));
         match self {
@@ -190,6 +212,7 @@ impl ParsedFormula {
             Self::Power(a, n) => domain.power(&of(a)?, *n),
             Self::Apply(function, operands) => {
                 let unary = match function.as_str() {
+                    // Arguments of sine and cosine are sums of angles, which domains treat as such.
                     "sin" | "cos" => {
                         let mut terms = Vec::new();
                         operands[0].angle(1, names, &mut terms);
@@ -208,7 +231,7 @@ impl ParsedFormula {
         }
     }
 
-    /// Reads an integer combination of angles.
+    /// Collects an integer combination of angles, multiplied by `factor`, into `terms`.
     fn angle(&self, factor: i32, names: &BTreeMap<String, Atom>, terms: &mut Vec<(Atom, i32)>) {
         match self {
             Self::Name(name) => terms.push((names[name], factor)),

@@ -1,17 +1,21 @@
-//! What a person sees at once in a sum or product that is printed: like terms, squares of a sine and a cosine that make one,
-//! squares of roots.
+//! Simplifications of printed sums and products: like terms are added, `sin^2 + cos^2` becomes 1, and squares of roots
+//! of numbers become numbers.
 
 use super::{FormulaFunction, PrintedFormula};
 use crate::expr::Rational;
 
-/// A term as a number times factors over factors.
+/// A term of a sum: a number times factors, divided by factors.
 struct SplitTerm {
+    /// The rational factor.
     factor: Rational,
+    /// Factors above the line.
     above: Vec<PrintedFormula>,
+    /// Factors below the line.
     below: Vec<PrintedFormula>,
 }
 
 impl SplitTerm {
+    /// Splits a formula; a formula that is neither a number nor a term is its own only factor.
     fn new(formula: PrintedFormula) -> Self {
         let (factor, above, below) = match formula {
             PrintedFormula::Number(n) => (n, Vec::new(), Vec::new()),
@@ -29,11 +33,13 @@ impl SplitTerm {
         }
     }
 
-    /// The same without the square of a sine or cosine, with whose it is.
+    /// For every factor that is the square of a sine or cosine: the function, its angle, and the other factors above
+    /// the line.
     fn without_squares(
         &self,
     ) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
         self.above.iter().enumerate().filter_map(|(i, factor)| {
+            // Only squares of one function of one angle count.
             let PrintedFormula::Power(base, 2) = factor else {
                 return None;
             };
@@ -44,17 +50,21 @@ impl SplitTerm {
             else {
                 return None;
             };
+            // The term without this factor.
             let mut rest = self.above.clone();
             rest.remove(i);
             Some((*function, operands.first()?, rest))
         })
     }
 
-    /// What a sine's and a cosine's square leave together, if all else is equal.
+    /// The factors above the line of the sum of two terms that differ only in `sin^2` and `cos^2` of one angle; `None`
+    /// for other terms.
     fn pythagorean_sum(&self, other: &Self) -> Option<Vec<PrintedFormula>> {
+        // Both terms must have the same number and the same denominator.
         if self.factor != other.factor || self.below != other.below {
             return None;
         }
+        // The other term must have the other function of the same angle, and the same remaining factors.
         let joins = |(f, angle, rest): (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)| {
             let is_met = other
                 .without_squares()
@@ -65,12 +75,12 @@ impl SplitTerm {
     }
 }
 
-/// Whether two products are the same in any order.
+/// Whether two products have the same factors in any order. Factors of a product are distinct.
 fn is_same(a: &[PrintedFormula], b: &[PrintedFormula]) -> bool {
     a.len() == b.len() && a.iter().all(|x| b.contains(x))
 }
 
-/// The terms of a sum with like ones added up, in the order in which they first stand.
+/// The terms of a sum with like terms added, in the order of their first occurrence.
 pub(super) fn collect_like_terms(terms: Vec<PrintedFormula>) -> Vec<PrintedFormula> {
     let mut found: Vec<SplitTerm> = Vec::with_capacity(terms.len());
     for term in terms.into_iter().map(SplitTerm::new) {
@@ -82,8 +92,9 @@ pub(super) fn collect_like_terms(terms: Vec<PrintedFormula>) -> Vec<PrintedFormu
         .collect()
 }
 
-/// Adds a term to those that are there.
+/// Adds a term to a list: to a like term, by `sin^2 + cos^2 = 1` to another term, or as a new one.
 fn insert_term(found: &mut Vec<SplitTerm>, term: SplitTerm) {
+    // A like term has the same factors.
     let like = found
         .iter_mut()
         .find(|other| is_same(&other.above, &term.above) && is_same(&other.below, &term.below));
@@ -91,6 +102,7 @@ fn insert_term(found: &mut Vec<SplitTerm>, term: SplitTerm) {
         other.factor = &other.factor + &term.factor;
         return;
     }
+    // A joined term may itself have a like term, so it is inserted again.
     let joined = found
         .iter()
         .enumerate()
@@ -111,7 +123,7 @@ fn insert_term(found: &mut Vec<SplitTerm>, term: SplitTerm) {
     }
 }
 
-/// Takes even powers of roots of numbers out of a product, and returns what they are.
+/// Removes even powers of roots of numbers from a product and returns the product of their values.
 pub(super) fn without_squared_roots(factors: &mut Vec<PrintedFormula>) -> Rational {
     let mut number = Rational::ONE;
     for factor in factors.iter_mut() {
@@ -124,6 +136,7 @@ pub(super) fn without_squared_roots(factors: &mut Vec<PrintedFormula>) -> Ration
         let [PrintedFormula::Number(inner)] = operands.as_slice() else {
             continue;
         };
+        // sqrt(x)^n = x^(n/2), with one root remaining for odd n.
         let halves = i32::try_from(*n / 2).unwrap_or(0);
         number = &number * &inner.pow(halves);
         *factor = if *n % 2 == 0 {

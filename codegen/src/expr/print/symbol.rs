@@ -1,11 +1,11 @@
-//! Names as they are typeset: `theta1` as a Greek letter with an index, `dc1` as d with the index c1.
+//! Names as they are typeset: `theta1` as a Greek letter with index 1, `dc1` as d with the index c1.
 
 /// A name with the number of its time derivatives.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FormulaSymbol {
     /// Identifier, as in the model file.
     pub name: String,
-    /// How often it is derived by time: 0, 1 or 2.
+    /// Number of time derivatives: 0, 1 or 2.
     pub order: u8,
 }
 
@@ -36,24 +36,27 @@ impl FormulaSymbol {
     }
 }
 
-/// A stretch of a typeset name.
+/// A part of a typeset name in one style.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum GlyphRun {
-    /// A Greek letter: LaTeX command and character.
+    /// A Greek letter: LaTeX command without backslash, and character.
     Greek(&'static str, char),
-    /// A letter, or letters and digits of an index.
+    /// A single letter, or letters and digits of an index, in italics.
     Italic(String),
-    /// A word that is read as one.
+    /// A word of several letters, upright.
     Word(String),
 }
 
 /// A letter or word with an index of several parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct TypesetName {
+    /// The letter or word itself.
     pub(crate) base: GlyphRun,
+    /// Parts of the index, each as runs of one style.
     pub(crate) index: Vec<Vec<GlyphRun>>,
 }
 
+/// Names of Greek letters that are recognised.
 const GREEK: [(&str, char); 29] = [
     ("alpha", 'α'),
     ("beta", 'β'),
@@ -86,6 +89,7 @@ const GREEK: [(&str, char); 29] = [
     ("Omega", 'Ω'),
 ];
 
+/// The Greek letter of this name, if there is one.
 fn greek(word: &str) -> Option<GlyphRun> {
     GREEK
         .iter()
@@ -93,18 +97,20 @@ fn greek(word: &str) -> Option<GlyphRun> {
         .map(|(name, letter)| GlyphRun::Greek(name, *letter))
 }
 
-/// Letters in a row up to this number are a letter with an index; more are a word, and so are as many small ones, such
-/// as `rod`, `len` or `off`, which hold no capital that could be the symbol.
+/// More letters than these in a row are a word; so are exactly this many small letters, such as `rod`, `len` or `off`,
+/// in which no capital letter could be the symbol.
 const LONGEST_SYMBOL: usize = 3;
 
 /// Splits an identifier into its letter and its index.
 pub(crate) fn typeset(name: &str) -> TypesetName {
+    // The part before the first underscore has the letter; the parts after it are parts of the index.
     let (head, tail) = name.split_once('_').unwrap_or((name, ""));
     let letters_end = head
         .find(|c: char| !c.is_alphabetic())
         .unwrap_or(head.len());
     let (letters, digits) = head.split_at(letters_end);
     let mut index: Vec<Vec<GlyphRun>> = Vec::new();
+    // A Greek letter, a word, or a letter whose other letters begin the index.
     let upper = letters.len() > 1 && letters.chars().all(char::is_uppercase);
     let (base, rest) = if let Some(letter) = greek(letters) {
         (letter, "")
@@ -127,6 +133,7 @@ pub(crate) fn typeset(name: &str) -> TypesetName {
     TypesetName { base, index }
 }
 
+/// Whether a run of letters is read as a word.
 fn is_word(letters: &str) -> bool {
     match letters.chars().count() {
         LONGEST_SYMBOL => letters.chars().all(char::is_lowercase),
@@ -134,6 +141,7 @@ fn is_word(letters: &str) -> bool {
     }
 }
 
+/// The style runs of one part of an index: a Greek letter with digits, a word, or italics.
 fn index_part(part: &str) -> Vec<GlyphRun> {
     let end = part
         .find(|c: char| !c.is_alphabetic())

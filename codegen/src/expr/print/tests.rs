@@ -174,7 +174,7 @@ proptest! {
         prop_assert!(latex_is_balanced(&latex), "{}", latex);
         let mathml = printed.mathml();
         prop_assert!(markup_is_balanced(&mathml), "{}", mathml);
-        // Parted, it says the same; only what was too wide is written with other signs.
+        // In segments the text is the same; only parts that were too wide are written with other signs.
         let stretches = printed.mathml_segments();
         for stretch in &stretches {
             prop_assert!(markup_is_balanced(stretch), "{}", stretch);
@@ -183,7 +183,7 @@ proptest! {
     }
 }
 
-/// What markup shows, without the signs that tell a fraction or a root on the line.
+/// The visible text of markup, without the signs of fractions and roots on the line.
 fn words(markup: &str) -> String {
     let mut shown: String = markup
         .split('<')

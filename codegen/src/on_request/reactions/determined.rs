@@ -1,11 +1,11 @@
-//! Which components of reactions equations of motion determine.
+//! Which components of reactions are determined by the equations of motion.
 //!
-//! Forces at the cuts that no virtual motion feels, the null space of the transposed Jacobian of all closing equations,
-//! may have any size. A component is determined if none of them reaches it.
+//! Forces at the cuts that do no work in any virtual motion may have any size. They are the null space of the
+//! transposed Jacobian of all closure equations. A component is determined if it depends on none of them.
 //!
-//! Decision: all unknowns of a cut are carried as symbols first. The pin of a planar loop may carry moments that
-//! the point in the model cannot; they count as unknown too. The null space is that of the file's geometry, but
-//! lengths across the plane of a loop are drawn at random, so that a length of zero hides nothing.
+//! Decision: all unknowns of a cut are kept as symbols first. The pin of a planar loop may transmit moments that the
+//! point in the model cannot; they are unknowns too. The null space is that of the file's geometry, but lengths across
+//! the plane of a loop are random, so that a length of zero hides nothing.
 
 use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
@@ -16,17 +16,18 @@ use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph};
 use crate::loops::numeric_poses::{NumericLoops, uniform_symmetric};
 use crate::regressor::UnreducedEquations;
 
-/// Poses that are looked at, and how far they reach, in rad or relative to the size of the loops.
+/// Number of random poses.
 const POSES: usize = 4;
+/// Distance of these poses from the nominal one, in rad or relative to the size of the loops.
 const REACH: f64 = 0.05;
-/// What counts as nothing beside the largest of its kind.
+/// Part of the largest value of its kind below which a value counts as zero.
 const ZERO_TOLERANCE: f64 = 1e-7;
 
-/// For every component whether it is determined.
+/// For every component, whether it is determined.
 ///
-/// The null space is that of the file's geometry at poses around the nominal one. Forces across the plane of a planar loop
-/// belong to it in every geometry, and so do moments that a pin there could transmit; what these reach is found with
-/// lengths drawn at random, so that no length that happens to be zero hides it.
+/// The null space is that of the file's geometry at poses near the nominal one. Forces across the plane of a planar
+/// loop belong to it in every geometry, and so do moments that a pin there could transmit. Components that depend on
+/// these are found with random lengths, so that a length of zero does not hide the dependence.
 pub(super) fn determined_components(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -40,7 +41,7 @@ pub(super) fn determined_components(
         return determined;
     }
     let tape = EvaluationTape::new(graph, components);
-    // What a unit of one unknown number adds to each component: without inertia there is nothing else.
+    // The contribution of one unit of an unknown to each component; without parameters there is no other contribution.
     let reach = |of: Atom, value: &dyn Fn(Atom) -> f64| {
         let atom = |atom: Atom| match atom {
             Atom::Base(_) => f64::from(u8::from(atom == of)),
@@ -50,8 +51,10 @@ pub(super) fn determined_components(
         tape.evaluate(&FloatDomain(atom))
     };
     let mut stream = RandomStream::new(17);
+    // First the unknowns that no geometry determines, at random constants and coordinates.
     for free in unconstrained_unknowns(cuts) {
         for _ in 0..POSES {
+            // The same seed for all atoms of a pose, so that each keeps its value.
             let seed = stream.next_bits();
             let drawn = |atom: Atom| match atom {
                 Atom::Pi => std::f64::consts::PI,
@@ -72,6 +75,7 @@ pub(super) fn determined_components(
         }
     }
 
+    // Then the null space at the file's geometry.
     let gaps: Vec<ExprId> = cuts.iter().flat_map(|cut| cut.gap).collect();
     let n = mechanism.coordinates.len();
     let slopes: Vec<ExprId> = (0..n)
@@ -82,6 +86,7 @@ pub(super) fn determined_components(
     let mut poses: Vec<Vec<f64>> = (0..POSES)
         .filter_map(|_| loops.random_pose(REACH, &mut stream))
         .collect();
+    // Without a random pose the nominal one has to do.
     if poses.is_empty() {
         poses.push(loops.declared_nominal_pose());
     }
@@ -92,15 +97,18 @@ pub(super) fn determined_components(
             Atom::Coordinate(i) => q[i],
             _ => 0.0,
         };
+        // Contribution of every unknown to every component at this pose.
         let found: Option<Vec<Vec<f64>>> = unknowns.iter().map(|of| reach(*of, &at)).collect();
         let (Some(found), Some(slopes)) = (found, jacobian.evaluate(&FloatDomain(at))) else {
             continue;
         };
+        // Columns are scaled to the unit of their coordinate, so that lengths and angles compare.
         let mut scaled = DMatrix::from_column_slice(gaps.len(), n, &slopes);
         for (i, mut column) in scaled.column_iter_mut().enumerate() {
             column *= loops.coordinate_unit(i);
         }
         let reaching = DMatrix::from_fn(components.len(), unknowns.len(), |r, c| found[c][r]);
+        // A component that changes along a vector of the null space is not determined.
         for null in null_space(&scaled) {
             let moved = &reaching * &null;
             for (r, determined) in determined.iter_mut().enumerate() {
@@ -111,7 +119,7 @@ pub(super) fn determined_components(
     determined
 }
 
-/// Unknown numbers that no virtual motion feels in any geometry.
+/// Unknowns that do no work in any virtual motion, in any geometry.
 fn unconstrained_unknowns(cuts: &[CutLoop]) -> Vec<Atom> {
     let mut free = Vec::new();
     for cut in cuts {
@@ -122,10 +130,10 @@ fn unconstrained_unknowns(cuts: &[CutLoop]) -> Vec<Atom> {
     free
 }
 
-/// Combinations of rows that vanish, each of length 1.
+/// Combinations of rows that are zero, each of length 1.
 fn null_space(rows: &DMatrix<f64>) -> Vec<nalgebra::DVector<f64>> {
     let (n, m) = rows.shape();
-    // As many columns as rows at least, or the decomposition would leave out a part of the space.
+    // With fewer columns than rows the decomposition would leave out a part of the null space.
     let padded = rows.clone().resize(n, m.max(n), 0.0);
     let svd = padded.svd(true, false);
     let Some(u) = svd.u else { return Vec::new() };

@@ -1,4 +1,5 @@
-//! Loads on the tree besides its bodies: forces at the cuts of loops, along linear drives, and of effects with mechanics.
+//! Loads on the tree other than its bodies: forces at the cuts of loops, along linear drives, and of effects with
+//! mechanics.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,37 +18,50 @@ use crate::regressor::mechanics::point_forces;
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
 
-/// A loop cut open: the force and the moment that its first side gets from the second, as unknown numbers.
+/// A loop cut open: force and moment from its second side on its first side are unknowns.
 pub(super) struct CutLoop {
+    /// Name of the loop.
     pub(super) name: String,
-    /// What closes the loop, along three axes that stand still on the common link.
+    /// Gap of the loop, in m, along three axes that are fixed on the common link.
     pub(super) gap: SymbolicVector,
-    /// Unknown force along these axes.
+    /// Unknown force along these axes, N.
     pub(super) force: [Atom; 3],
-    /// Unknown moment about two of them that a pin could transmit; none for loops in space, whose cut is a ball joint.
+    /// Unknown moment about two of the axes that a pin could transmit, N m; none for spatial loops, which are cut at a
+    /// ball joint.
     pub(super) moment: Option<[Atom; 2]>,
-    /// The link with the joint in whose axes the force is shown.
+    /// Index of the link in the axes of whose joint the force is reported.
     pub(super) shown_in: usize,
+    /// The last link that both sides have in common; none if that is the base.
     common: Option<usize>,
-    /// Turns from the three axes to each link, and the links' points.
+    /// Rotations from the three axes to the link of each side, and the position of its point.
     sides: [CutSide; 2],
+    /// Rotations from the three axes to those in which the force is reported.
     shown: Vec<AxisRotation>,
 }
 
+/// One side of a cut.
 struct CutSide {
+    /// The link with the point; none if the point is on the base.
     link: Option<usize>,
+    /// Rotations from the axes of the cut to this link.
     turns: Vec<AxisRotation>,
+    /// Position of the point in the frame of the link, m.
     at: SymbolicVector,
 }
 
-/// Paths of two points from the link that carries both, that link, and the points' places in their own frames.
+/// Paths to two points from their last common link.
 struct CutPaths {
+    /// Links of each path, outwards.
     links: [Vec<usize>; 2],
+    /// The common link; none if it is the base.
     common: Option<usize>,
+    /// The link with each point; none if it is on the base.
     of_points: [Option<usize>; 2],
+    /// Position of each point in the frame of its link, m.
     at: [SymbolicVector; 2],
 }
 
+/// The paths to two points; errors are those of the points' coordinates.
 fn paths_from_common_link(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -57,6 +71,7 @@ fn paths_from_common_link(
     let points = points.map(|p| &mechanism.points[p.0]);
     let of_points = points.map(|p| tree.link_of(p.frame));
     let [a, b] = of_points.map(|link| tree.path_to(link));
+    // Links that both paths have in common.
     let shared = a.iter().zip(&b).take_while(|(x, y)| x == y).count();
     Ok(CutPaths {
         common: shared.checked_sub(1).map(|last| a[last]),
@@ -69,7 +84,7 @@ fn paths_from_common_link(
     })
 }
 
-/// Turns along a path of links, behind others.
+/// Rotations along a path of links after the rotations of `start`.
 fn rotations_along(
     tree: &KinematicTree,
     start: &[AxisRotation],
@@ -84,7 +99,7 @@ fn rotations_along(
     turns
 }
 
-/// Whether turns, but for fixed ones at their inner end, are one about z.
+/// Whether rotations, apart from constant ones at their inner end, are a single one about z.
 fn is_rotation_about_z(turns: &[AxisRotation]) -> bool {
     let fixed = turns.iter().rev().take_while(|turn| turn.sum.is_empty());
     match &turns[..turns.len() - fixed.count()] {
@@ -94,12 +109,12 @@ fn is_rotation_about_z(turns: &[AxisRotation]) -> bool {
     }
 }
 
-/// Unknown number `k` of cut `l`. Base parameters have no part in reactions, so that their atoms are free.
+/// Unknown `k` of cut `l`. Reactions have no base parameters, so the atoms of these serve as unknowns.
 fn unknown_atom(l: usize, k: usize) -> Atom {
     Atom::Base(5 * l + k)
 }
 
-/// All loops, cut open; `free` are links whose joints transmit nothing.
+/// All loops, cut open. `free` are links of floating bodies, whose joints transmit nothing.
 pub(super) fn cut_loops(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -109,8 +124,11 @@ pub(super) fn cut_loops(
     let tree = &equations.tree;
     let mut cuts = Vec::new();
     for (l, closed) in mechanism.loops.iter().enumerate() {
+        // Both sides of the loop, from the last common link.
         let paths = paths_from_common_link(graph, mechanism, tree, closed.joins)?;
         let [first, second] = &paths.links;
+        // The axes of the cut are those after the first constant rotations of a path, in which planar loops have no gap
+        // along z.
         let into = fixed_rotations(tree, first)
             .or_else(|| fixed_rotations(tree, second))
             .unwrap_or_default();
@@ -121,6 +139,7 @@ pub(super) fn cut_loops(
         };
         let path = between.segments(graph, tree, &start);
         let gap = sum_segments(graph, &path);
+        // The force is reported in the axes of the last joint of the first path that transmits something.
         let told = |i: usize| tree.links[i].is_moving() && !free.contains(&i);
         let moving = |i: usize| tree.links[i].is_moving();
         let last_joint = |links: &[usize], of: &dyn Fn(usize) -> bool| {
@@ -131,7 +150,7 @@ pub(super) fn cut_loops(
             .or_else(|| last_joint(second, &told))
             .or_else(|| last_joint(first, &moving))
             .or_else(|| last_joint(second, &moving));
-        // A loop without a joint closes nothing that could move.
+        // A loop without a moving joint transmits nothing that depends on the motion.
         let Some((shown_in, shown)) = found else {
             continue;
         };
@@ -140,8 +159,9 @@ pub(super) fn cut_loops(
             turns: rotations_along(tree, &start, &paths.links[k]),
             at: paths.at[k],
         };
+        // Both ends of the cut.
         let sides = [side(0), side(1)];
-        // Points stay in one plane, and their frames turn about its normal alone.
+        // Planar: points stay in a plane, and their frames rotate about its normal only.
         let is_planar =
             gap[2] == Graph::ZERO && sides.iter().all(|s| is_rotation_about_z(&s.turns));
         cuts.push(CutLoop {
@@ -159,7 +179,7 @@ pub(super) fn cut_loops(
 }
 
 impl CutLoop {
-    /// What the joints must supply because of the cut.
+    /// Loads on the joints because of the cut: force and moment act on both sides with opposite signs.
     pub(super) fn joint_loads(&self, graph: &mut Graph, tree: &KinematicTree) -> Vec<JointLoad> {
         debug_assert!(self.common.is_none_or(|c| c < tree.links.len()));
         let force = self.force.map(|atom| graph.atom(atom));
@@ -173,10 +193,11 @@ impl CutLoop {
                 continue;
             };
             let [force, moment] = [force, moment].map(|v| {
-                // The first side is pushed, so that its joints supply less.
+                // The force pushes the first side, so its joints have to supply less.
                 let v = if k == 0 { v.map(|x| graph.neg(x)) } else { v };
                 rotate_into_inner(graph, &side.turns, &v)
             });
+            // The force acts at the point, the moment is added.
             let wrench = force_through_point(graph, &side.at, force);
             let moment = graph.add_vectors(&[wrench.moment, moment]);
             loads.push(JointLoad {
@@ -188,7 +209,7 @@ impl CutLoop {
         loads
     }
 
-    /// The force on the first side, in the axes in which it is shown.
+    /// The force on the first side, in the axes in which it is reported.
     pub(super) fn reported_force(&self, graph: &mut Graph, tree: &KinematicTree) -> SymbolicVector {
         let force = self.force.map(|atom| graph.atom(atom));
         let force = rotate_into_inner(graph, &self.shown, &force);
@@ -196,8 +217,8 @@ impl CutLoop {
     }
 }
 
-/// Values for the unknown numbers: forces along the gaps, and nothing where there is no equation. A gap that two loops
-/// share is closed by the first of them; how they share its force is not determined.
+/// Values of the unknowns: forces along the gaps, and zero where there is no equation. If two loops have the same gap,
+/// the first one gets its force; how they share it is not determined.
 pub(super) fn known_values(
     graph: &mut Graph,
     cuts: &[CutLoop],
@@ -217,7 +238,7 @@ pub(super) fn known_values(
     known
 }
 
-/// Forces of linear drives, which push their points apart.
+/// Loads of linear drives, whose force pushes their two points apart.
 pub(super) fn drive_loads(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -236,6 +257,7 @@ pub(super) fn drive_loads(
             at: paths.at,
         };
         let path = between.segments(graph, tree, &[]);
+        // The force as a vector: magnitude times the unit vector between the points.
         let along = sum_segments(graph, &path);
         let length = equations.projection.drives[d].coordinate;
         let per_length = graph.pow(length, -1);
@@ -262,7 +284,7 @@ pub(super) fn drive_loads(
     Ok(loads)
 }
 
-/// What effects with mechanics of their own need at points.
+/// Loads of effects with mechanics of their own, at the points where they act.
 pub(super) fn effect_loads(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -273,6 +295,7 @@ pub(super) fn effect_loads(
     let projection = &equations.projection;
     let mut loads = Vec::new();
     for effect in &mechanism.effects {
+        // Values of the effect's parameters.
         let values: Vec<ExprId> = effect
             .terms
             .iter()
@@ -280,6 +303,7 @@ pub(super) fn effect_loads(
             .collect();
         let forces = point_forces(graph, mechanism, tree, projection, gravity, effect, &values)?;
         for (point, force) in forces {
+            // A force on the base loads no joint.
             let point = &mechanism.points[point.0];
             let Some(link) = tree.link_of(point.frame) else {
                 continue;

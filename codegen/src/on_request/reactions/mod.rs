@@ -1,15 +1,15 @@
-//! What joints transmit: forces and moments in the joints of the tree and at the points where loops are closed.
+//! Reactions: forces and moments in the joints of the tree and at the points where loops are closed.
 //!
-//! Newton and Euler's equations of the tree (Luh, Walker and Paul 1980) with the forces of the loops as further loads:
-//! the equations of the passive coordinates determine them, `J' lambda = tau - (d l / d q)' f` with the Jacobian J of the
-//! closing equations and the forces f of the drives. Where a mechanism is overconstrained, as a planar one in space is,
-//! equations of motion say only some of them (`determined`); the others are left out.
+//! Newton and Euler's equations of the tree (Luh, Walker and Paul 1980) with the forces of the loops as additional
+//! loads. The equations of the passive coordinates determine these forces: `J' lambda = tau - (d l / d q)' f`, with the
+//! Jacobian J of the closure equations and the forces f of the drives. In an overconstrained mechanism, such as a
+//! planar one in space, the equations of motion determine only some components (`determined`); the others are left out.
 //!
-//! Reactions depend on all inertial parameters: many that no drive feels, and that base parameters therefore do not hold,
-//! load a bearing all the same.
+//! Reactions depend on all inertial parameters. Bearings carry loads of parameters that have no effect on the drives,
+//! and base parameters do not contain those.
 //!
-//! Decision: a pair of forces stops at the link that carries both, so that nothing cancels in rounding. Reactions
-//! are derived on request, like the equation of motion.
+//! Decision: a pair of forces ends at the link that is common to both sides, so that nothing cancels by rounding.
+//! Reactions are derived on request, like the equation of motion.
 
 mod determined;
 mod loads;
@@ -33,7 +33,7 @@ use crate::{Derivation, DeriveError};
 
 use loads::CutLoop;
 
-/// Reactions of a mechanism: where they act, and the program that computes those that are determined.
+/// Reactions of a mechanism: where they act, and the program that computes the components that are determined.
 #[derive(Clone, Debug)]
 pub struct ReactionPrograms {
     /// Joints of the tree, from the base outwards.
@@ -44,9 +44,9 @@ pub struct ReactionPrograms {
     pub program: StraightLineProgram,
 }
 
-/// What a joint transmits to the side away from the base, drive and friction in it included.
+/// Force and moment that a joint transmits to the side away from the base, including its drive and friction.
 ///
-/// Components are along the axes that the frame's steps reach behind the joint (the frame's own if nothing follows), the
+/// Components are in the axes that the frame's steps reach after the joint (the frame's own if no step follows). The
 /// moment is about the origin reached there, which lies on the joint's axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JointReaction {
@@ -56,13 +56,13 @@ pub struct JointReaction {
     pub coordinates: Vec<String>,
     /// The axis about or along which it moves.
     pub axis: FrameAxis,
-    /// Place of each component in the program's outputs; `None` for what equations of motion do not determine.
+    /// Position of each component in the program's outputs; `None` if the equations of motion do not determine it.
     pub force: [Option<usize>; 3],
-    /// The same of the moment.
+    /// The same for the moment.
     pub moment: [Option<usize>; 3],
 }
 
-/// The force at the point where a loop is closed, on the side of the first point that it joins.
+/// The force at the point where a loop is closed, on the side of its first point.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoopReaction {
     /// Name of the loop.
@@ -70,21 +70,22 @@ pub struct LoopReaction {
     /// The joint along whose axes its components are: the last one before the first point, or before the second one if
     /// the first lies on a free body.
     pub axes: String,
-    /// Place of each component in the program's outputs; `None` for what equations of motion do not determine.
+    /// Position of each component in the program's outputs; `None` if the equations of motion do not determine it.
     pub force: [Option<usize>; 3],
 }
 
 impl Derivation {
-    /// Forces and moments that the joints transmit. They are derived here, on demand.
+    /// Forces and moments that the joints transmit. They are derived by this call.
     ///
     /// # Errors
-    /// Loops that are too large to be solved for their forces.
+    /// Loops with too many coupled unknowns to be solved symbolically for their forces.
     pub fn reactions(&self) -> Result<ReactionPrograms, DeriveError> {
         let mut graph = self.graph.clone();
         reactions(&mut graph, &self.mechanism, &self.equations, &self.closing)
     }
 }
 
+/// Derives the program and the tables of joints and loops.
 fn reactions(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -92,10 +93,12 @@ fn reactions(
     closing: &PassiveClosure,
 ) -> Result<ReactionPrograms, DeriveError> {
     let tree = &equations.tree;
+    // Links without a joint that could transmit anything, and the cuts of the loops.
     let free = free_links(mechanism, equations);
     let cuts = loads::cut_loops(graph, mechanism, equations, &free)?;
     let value = product_values(graph, equations);
     let value = |m: &ParameterMonomial| value.get(m).copied().unwrap_or(Graph::ZERO);
+    // Loads: bodies, then drives and effects, then the unknown forces of the cuts.
     let mut all = body_wrenches(graph, equations, &value);
     let on_tree = required_forces(graph, mechanism, equations, &value, &all)?;
     let drives = equations.projection.drive_forces(graph, &on_tree)?;
@@ -107,6 +110,7 @@ fn reactions(
         all.extend(cut.joint_loads(graph, tree));
     }
 
+    // Components in the order of the tables: force and moment per joint, then force per loop.
     let places = reaction_joints(mechanism, equations, &free);
     let mut components: Vec<[ExprId; 3]> = Vec::new();
     let wrenches = joint_wrenches(graph, tree, all);
@@ -122,7 +126,7 @@ fn reactions(
     let determined =
         determined::determined_components(graph, mechanism, equations, &cuts, &components);
 
-    // What is not determined may be anything, so it may be nothing.
+    // Components that are not determined do not depend on the choice of the unknown forces, so these are set to zero.
     let known = loads::known_values(graph, &cuts, &closing_forces.of_gap);
     let outputs: Vec<ExprId> = components
         .iter()
@@ -130,10 +134,12 @@ fn reactions(
         .filter_map(|(component, determined)| determined.then_some(*component))
         .collect();
     let outputs = graph.substitute(&outputs, &known);
+    // Poses where the forces of the loops do not exist are refused.
     let mut closing = closing.clone();
     closing.add_guards(graph, mechanism, &closing_forces.determinants);
     let program = closing.program(graph, equations, &outputs);
 
+    // Positions of the determined components among the outputs.
     let mut next = 0;
     let mut place_of = determined.iter().map(|determined| {
         determined.then(|| {
@@ -141,6 +147,7 @@ fn reactions(
             next - 1
         })
     });
+    // The next three positions.
     let mut three = || [(); 3].map(|()| place_of.next().flatten());
     let joints = places.iter().map(|place| JointReaction {
         name: place.name.clone(),
@@ -164,7 +171,7 @@ fn reactions(
     })
 }
 
-/// Every product of parameters as an expression.
+/// Every product of parameters as an expression of single parameters.
 fn product_values(
     graph: &mut Graph,
     equations: &UnreducedEquations,
@@ -175,7 +182,7 @@ fn product_values(
         .collect()
 }
 
-/// What moves the bodies, link by link.
+/// Wrenches that accelerate the bodies and carry their weight, link by link.
 fn body_wrenches(
     graph: &mut Graph,
     equations: &UnreducedEquations,
@@ -193,7 +200,7 @@ fn body_wrenches(
     loads.collect()
 }
 
-/// Generalised forces that the open tree needs on its coordinates, effects included.
+/// Generalised forces that the open tree needs on its coordinates, including effects.
 fn required_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -202,6 +209,7 @@ fn required_forces(
     bodies: &[JointLoad],
 ) -> Result<Vec<ExprId>, DeriveError> {
     let n = mechanism.coordinates.len();
+    // Wrenches of the bodies, projected on the joints.
     let wrenches: Vec<_> = bodies
         .iter()
         .map(|load| (load.link, newton_euler::JointSide::Moving, load.wrench))
@@ -221,15 +229,15 @@ fn required_forces(
         .collect())
 }
 
-/// Forces along the gaps of loops.
+/// Forces in the closures of loops.
 struct LoopClosureForces {
-    /// By the closing equation; those of all others are taken as nothing.
+    /// Force by gap; gaps that are not listed have none.
     of_gap: BTreeMap<ExprId, ExprId>,
-    /// What must not vanish for them to exist.
+    /// Determinants that must not be zero for these forces to exist.
     determinants: Vec<ExprId>,
 }
 
-/// Forces that close the loops, where the drives act with the given forces.
+/// Forces in the closures of the loops, if the drives act with the given forces.
 fn loop_closure_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -246,8 +254,10 @@ fn loop_closure_forces(
         });
     }
     let coordinates: Vec<ExprId> = projection.drives.iter().map(|d| d.coordinate).collect();
+    // Generalised forces that the drives do not supply.
     let left: Vec<ExprId> = (0..mechanism.coordinates.len())
         .map(|i| {
+            // What the drives supply, by the transposed derivative of their lengths.
             let slopes = graph.differentiate(&coordinates, Atom::Coordinate(i));
             let driven: Vec<ExprId> = slopes
                 .iter()
@@ -258,10 +268,11 @@ fn loop_closure_forces(
             graph.sub(on_tree[i], driven)
         })
         .collect();
+    // As many gaps as passive coordinates, or the forces are not determined.
     let gaps = closing_gaps(graph, mechanism, equations, cuts);
     if gaps.len() != projection.loops.passive.len() {
         return Err(DeriveError::Singular {
-            what: "the loops for their forces".to_owned(),
+            what: "the forces of the loops".to_owned(),
         });
     }
     let solution = projection.multipliers(graph, &gaps, &left)?;
@@ -272,8 +283,8 @@ fn loop_closure_forces(
     })
 }
 
-/// As many components of the loops' gaps as determine the passive coordinates: those by which the loops were solved, or,
-/// where relations between angles took their place, those that do it best at the nominal pose.
+/// As many components of the gaps as there are passive coordinates, which they determine. These are the residuals by
+/// which the loops were solved, if they are gaps; otherwise the best conditioned ones at the nominal pose.
 fn closing_gaps(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -281,7 +292,7 @@ fn closing_gaps(
     cuts: &[CutLoop],
 ) -> Vec<ExprId> {
     let projection = &equations.projection;
-    // Couplings are no cuts, and carry what no other gap does.
+    // Couplings have no cut, but their residual transmits force as well.
     let couplings = &projection.loops.closures[mechanism.loops.len()..];
     let mut all: Vec<ExprId> = couplings.iter().flat_map(|c| c.residual.clone()).collect();
     for gap in cuts.iter().flat_map(|cut| cut.gap) {
@@ -297,6 +308,7 @@ fn closing_gaps(
     {
         return projection.loops.residual.clone();
     }
+    // Derivatives of all gaps by the passive coordinates, at the nominal pose.
     let slopes: Vec<ExprId> = projection
         .loops
         .passive
@@ -313,14 +325,17 @@ fn closing_gaps(
     rows.into_iter().map(|row| all[row]).collect()
 }
 
-/// A joint whose reaction is told.
+/// A joint whose reaction is reported.
 struct ReactionJoint {
+    /// Index of its link.
     link: usize,
+    /// Name for the tables.
     name: String,
+    /// Names of its coordinates.
     coordinates: Vec<String>,
 }
 
-/// The frame that each link belongs to.
+/// The frame of each link; a frame with several joints has several links.
 fn link_frames(tree: &KinematicTree) -> Vec<usize> {
     let mut frames = Vec::with_capacity(tree.links.len());
     for (frame, last) in tree.of_frame.iter().enumerate() {
@@ -331,6 +346,7 @@ fn link_frames(tree: &KinematicTree) -> Vec<usize> {
     frames
 }
 
+/// Names of the coordinates that move a link, in the order of the model.
 fn coordinates_of(mechanism: &Mechanism, tree: &KinematicTree, link: usize) -> Vec<String> {
     let link = &tree.links[link];
     let turns = link.turns.iter().map(|(c, _)| *c);
@@ -339,13 +355,14 @@ fn coordinates_of(mechanism: &Mechanism, tree: &KinematicTree, link: usize) -> V
     all.into_iter().map(name).collect()
 }
 
-/// Names of all links by their frames, with their coordinates where a frame has several joints.
+/// Names of all links: the name of the frame, with coordinates where a frame has several joints.
 fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
     let frames = link_frames(tree);
     let moving = |i: &usize| tree.links[*i].is_moving();
     (0..tree.links.len())
         .map(|i| {
             let frame = &mechanism.frames[frames[i]].name;
+            // Other moving links of the same frame.
             let others = (0..tree.links.len()).filter(|k| frames[*k] == frames[i]);
             if others.filter(moving).count() < 2 {
                 return frame.clone();
@@ -355,7 +372,7 @@ fn link_names(mechanism: &Mechanism, tree: &KinematicTree) -> Vec<String> {
         .collect()
 }
 
-/// All joints but those of free bodies, which only count coordinates and transmit nothing.
+/// All joints that transmit something: those of floating bodies only count coordinates.
 fn reaction_joints(
     mechanism: &Mechanism,
     equations: &UnreducedEquations,
@@ -373,11 +390,12 @@ fn reaction_joints(
         .collect()
 }
 
-/// Links of frames that move in six coordinates of their own on which nothing acts.
+/// Links of floating bodies: frames with six coordinates of their own on which no drive and no effect acts.
 fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet<usize> {
     let tree = &equations.tree;
     let frames = link_frames(tree);
     let driven = |i: usize| {
+        // Drives and effects on the coordinate.
         let by_drive = mechanism
             .drives
             .iter()
@@ -396,6 +414,7 @@ fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet
             turns.chain(slides).collect::<Vec<usize>>()
         };
         let all: BTreeSet<usize> = links.iter().flat_map(coordinates).collect();
+        // A coordinate that also moves another frame couples the two.
         let elsewhere = (0..tree.links.len())
             .filter(|i| frames[*i] != frame)
             .any(|i| coordinates(&i).iter().any(|c| all.contains(c)));
@@ -406,7 +425,7 @@ fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet
     free
 }
 
-/// A force through a point: its moment about the origin goes with it.
+/// A force through a point as a wrench about the origin.
 fn force_through_point(
     graph: &mut Graph,
     at: &SymbolicVector,

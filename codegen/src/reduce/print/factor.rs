@@ -1,5 +1,5 @@
-//! Factors of polynomials in the constants as far as trial division finds them: a number, a monomial, linear factors
-//! with small coefficients. What is left over stays a sum; the product is always the polynomial itself.
+//! Factors of polynomials in the constants that trial division finds: a number, a monomial, and linear factors with
+//! small coefficients. The rest stays a sum, so that the product always equals the polynomial.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,16 +9,21 @@ use crate::expr::Rational;
 
 /// A product that equals a polynomial.
 pub(super) struct FactoredPolynomial {
+    /// Rational factor with the sign of the leading term.
     pub(super) number: Rational,
+    /// Common powers of all terms.
     pub(super) monomial: PowerProduct,
     /// Polynomials of several terms with their exponents.
     pub(super) factors: Vec<(TrigonometricPolynomial, u32)>,
 }
 
-/// Beyond these the search is not cheap and the result is not readable anyway.
+/// Most terms of a polynomial whose factors are searched; beyond this the search is slow and the result is not
+/// readable.
 const MOST_TERMS: usize = 60;
+/// Most variables of such a polynomial.
 const MOST_VARIABLES: usize = 7;
 
+/// Factors a polynomial. The zero polynomial has the number 0 and no factors.
 pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomial {
     let mut number = content(p);
     let Some((_, leading)) = ordered_terms(p).into_iter().next() else {
@@ -28,9 +33,11 @@ pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomi
             factors: Vec::new(),
         };
     };
+    // The leading term of the remaining polynomial is positive.
     if leading.is_negative() {
         number = -&number;
     }
+    // Number and common powers are divided out first.
     let monomial = common_powers(p);
     let inverse = number.recip();
     let mut rest: TrigonometricPolynomial = p
@@ -40,7 +47,9 @@ pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomi
             (left, k * &inverse)
         })
         .collect();
+    // Each candidate is divided out as often as possible.
     let mut factors: Vec<(TrigonometricPolynomial, u32)> = Vec::new();
+    // Variables that the remaining polynomial contains.
     let names: BTreeSet<FactorVariable> = rest.keys().flatten().map(|(v, _)| *v).collect();
     if rest.len() <= MOST_TERMS && names.len() <= MOST_VARIABLES {
         for divisor in linear_form_candidates(&names.into_iter().collect::<Vec<_>>()) {
@@ -69,6 +78,7 @@ pub(super) fn factor_polynomial(p: &TrigonometricPolynomial) -> FactoredPolynomi
     }
 }
 
+/// The powers that all terms have in common.
 fn common_powers(p: &TrigonometricPolynomial) -> PowerProduct {
     p.keys()
         .map(|powers| powers.iter().copied().collect::<BTreeMap<_, _>>())
@@ -82,7 +92,9 @@ fn common_powers(p: &TrigonometricPolynomial) -> PowerProduct {
         .collect()
 }
 
+/// The quotient of two monomials, if it is a monomial.
 fn divide_powers(powers: &PowerProduct, by: &PowerProduct) -> Option<PowerProduct> {
+    // Exponents that remain.
     let mut left: BTreeMap<FactorVariable, u32> = powers.iter().copied().collect();
     for (v, n) in by {
         let there = left.get_mut(v)?;
@@ -91,6 +103,7 @@ fn divide_powers(powers: &PowerProduct, by: &PowerProduct) -> Option<PowerProduc
     Some(left.into_iter().filter(|(_, n)| *n > 0).collect())
 }
 
+/// The product of two monomials.
 fn multiply_powers(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     let mut total: BTreeMap<FactorVariable, u32> = a.iter().copied().collect();
     for (v, n) in b {
@@ -99,8 +112,9 @@ fn multiply_powers(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
     total.into_iter().collect()
 }
 
-/// Linear forms worth trying: `a u + b v` with coefficients up to 2, and `u + v + w` with any signs.
+/// Candidates for linear factors: `a u + b v` with coefficients up to 2, and `u + v + w` with all signs.
 fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPolynomial> {
+    // A linear form from variables and coefficients.
     let linear = |terms: &[(FactorVariable, i64)]| -> TrigonometricPolynomial {
         terms
             .iter()
@@ -123,25 +137,28 @@ fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPoly
     found
 }
 
-/// The leading term in the lexicographic order of variables, an order that products respect.
+/// The leading term in the lexicographic order of variables, which is compatible with products.
 fn leading_term(p: &TrigonometricPolynomial) -> Option<(&PowerProduct, &Rational)> {
     p.iter()
         .max_by(|(a, _), (b, _)| super::compare_powers(b, a))
 }
 
-/// The exact quotient, if there is one.
+/// The quotient of two polynomials, if the division has no remainder.
 fn exact_quotient(
     p: &TrigonometricPolynomial,
     by: &TrigonometricPolynomial,
 ) -> Option<TrigonometricPolynomial> {
+    // Polynomial long division by leading terms.
     let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
     let mut rest = p.clone();
     let mut quotient = TrigonometricPolynomial::new();
+    // The leading term of the rest must be divisible by that of the divisor.
     while let Some((powers, value)) = leading_term(&rest) {
         let step = divide_powers(powers, lead)?;
         let value = value * &inverse;
         for (other, k) in by {
+            // The divisor times the step is subtracted from the rest.
             let at = multiply_powers(&step, other);
             let there = rest.remove(&at).unwrap_or(Rational::ZERO);
             let left = &there - &(&value * k);
@@ -154,18 +171,23 @@ fn exact_quotient(
     Some(quotient)
 }
 
-/// `number * (sum of linear)^2`, which consists of `terms` of a polynomial.
+/// `number * (sum of linear)^2`, and the terms of a polynomial that it consists of.
 pub(super) struct SumSquare {
+    /// Rational factor.
     pub(super) number: Rational,
+    /// Variables with their coefficients; the first one is 1.
     pub(super) linear: Vec<(FactorVariable, Rational)>,
+    /// Terms of the polynomial that the square stands for.
     pub(super) terms: Vec<PowerProduct>,
 }
 
-/// Squares of sums of several variables that a polynomial contains term by term.
+/// Squares of sums of several variables that a polynomial contains with all their terms.
 pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
+    // Coefficient of a mixed term.
     let cross =
         |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    // Variables with a pure square are candidates.
     let mut variables: Vec<FactorVariable> = p
         .keys()
         .filter_map(|powers| match powers.as_slice() {
@@ -176,8 +198,11 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     variables.sort();
     let mut found = Vec::new();
     while !variables.is_empty() {
+        // The first variable fixes the coefficients of all others by its mixed terms.
         let first = variables.remove(0);
+        // The number in front of the square.
         let number = coefficient(&vec![(first, 2)]);
+        // A mixed term has twice the product of the coefficients.
         let half = (&number * &Rational::integer(2)).recip();
         let mut linear = vec![(first, Rational::ONE)];
         for v in &variables {
@@ -186,6 +211,7 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
                 linear.push((*v, k));
             }
         }
+        // All squares and mixed terms must match.
         let whole = linear.iter().enumerate().all(|(i, (u, k))| {
             coefficient(&vec![(*u, 2)]) == &number * &(k * k)
                 && linear[i + 1..]
@@ -195,7 +221,9 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
         if linear.len() < 2 || !whole {
             continue;
         }
+        // A variable belongs to one square only.
         variables.retain(|v| linear.iter().all(|(u, _)| u != v));
+        // Terms that the square replaces.
         let mut terms = Vec::new();
         for (i, (u, _)) in linear.iter().enumerate() {
             terms.push(vec![(*u, 2)]);

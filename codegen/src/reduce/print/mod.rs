@@ -1,4 +1,4 @@
-//! Printing of the factors of eq. (6): expanded for scripts, factored for people.
+//! Printing of the factors of eq. (6): expanded for scripts, factored for readers.
 
 mod factor;
 
@@ -14,7 +14,7 @@ use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, PrintedFormula};
 
 impl FactorVariable {
-    /// As it is printed: the constant's name, or its sine or cosine.
+    /// The variable as it is printed: the name of a constant, its sine or cosine, or a root.
     pub fn formula(self, mechanism: &Mechanism) -> PrintedFormula {
         let name = |i: usize| PrintedFormula::name(&*mechanism.constants[i].name);
         match self {
@@ -29,12 +29,14 @@ impl FactorVariable {
 }
 
 impl RationalFunction {
-    /// As a sum of plain terms, each times `factors`: what a script reads.
+    /// The terms of the expanded numerator, each divided by the denominator and multiplied by `factors`: the form that
+    /// a script reads.
     pub fn expanded_terms(
         &self,
         mechanism: &Mechanism,
         factors: &[PrintedFormula],
     ) -> Vec<PrintedFormula> {
+        // A denominator of one term is divided factor by factor, any other one as a whole.
         let below = match self.denominator.first_key_value() {
             Some((powers, k)) if self.denominator.len() == 1 => {
                 let mut below = power_factors(powers, mechanism);
@@ -46,6 +48,7 @@ impl RationalFunction {
         ordered_terms(&self.numerator)
             .into_iter()
             .map(|(powers, k)| {
+                // Each term keeps the whole denominator, so that terms can be read alone.
                 let above = power_factors(powers, mechanism)
                     .into_iter()
                     .chain(factors.iter().cloned());
@@ -54,13 +57,14 @@ impl RationalFunction {
             .collect()
     }
 
-    /// As a sum of plain terms.
+    /// The function as a sum of expanded terms.
     pub fn expanded_formula(&self, mechanism: &Mechanism) -> PrintedFormula {
         PrintedFormula::sum(self.expanded_terms(mechanism, &[]))
     }
 
-    /// Factored as far as is cheap: numbers and powers outside, linear factors, sums of squares.
+    /// The function factored as far as is cheap: numbers and powers in front, linear factors, sums of squares.
     pub fn formula(&self, mechanism: &Mechanism) -> PrintedFormula {
+        // Numerator and denominator are factored separately.
         let (number, above) = polynomial_factors(&self.numerator, mechanism);
         let (divisor, below) = polynomial_factors(&self.denominator, mechanism);
         if number.is_zero() {
@@ -70,19 +74,23 @@ impl RationalFunction {
     }
 
     /// The number in front and the function without it, so that equal functions up to a number can be recognised.
+    #[cfg(any(test, feature = "review"))]
+    /// The rational factor and the function without it, so that functions that differ by a number only are equal.
     pub(crate) fn split_number(&self) -> (Rational, Self) {
         let Some((_, leading)) = ordered_terms(&self.numerator).into_iter().next() else {
             return (Rational::ZERO, Self::constant(Rational::ONE));
         };
+        // The number has the sign of the leading term.
         let mut content = content(&self.numerator);
         if leading.is_negative() {
             content = -&content;
         }
-        // The denominator's number goes along.
+        // The number of the denominator belongs to the factor as well.
         let below = self
             .denominator
             .values()
             .fold(Rational::ZERO, |c, k| c.content_with(k));
+        // A polynomial divided by a number.
         let scaled = |p: &TrigonometricPolynomial, by: &Rational| -> TrigonometricPolynomial {
             let inverse = by.recip();
             p.iter().map(|(v, k)| (v.clone(), k * &inverse)).collect()
@@ -95,12 +103,12 @@ impl RationalFunction {
     }
 }
 
-/// The largest number that divides all coefficients.
+/// The greatest common divisor of all coefficients.
 fn content(p: &TrigonometricPolynomial) -> Rational {
     p.values().fold(Rational::ZERO, |c, k| c.content_with(k))
 }
 
-/// Powers as factors.
+/// A monomial as a list of powers.
 fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFormula> {
     powers
         .iter()
@@ -111,14 +119,16 @@ fn power_factors(powers: &PowerProduct, mechanism: &Mechanism) -> Vec<PrintedFor
         .collect()
 }
 
-/// Terms as people order them: higher degrees first, then higher powers of the constants that are declared first.
+/// Terms in the usual order: higher degrees first, then higher powers of the constants that are declared first.
 fn ordered_terms(p: &TrigonometricPolynomial) -> Vec<(&PowerProduct, &Rational)> {
+    // Sum of the exponents.
     let degree = |powers: &PowerProduct| powers.iter().map(|(_, n)| *n).sum::<u32>();
     let mut terms: Vec<_> = p.iter().collect();
     terms.sort_by(|(a, _), (b, _)| degree(b).cmp(&degree(a)).then_with(|| compare_powers(a, b)));
     terms
 }
 
+/// Order of two monomials by their variables and powers; a monomial that continues comes before one that ends.
 fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {
@@ -127,6 +137,7 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
             (None, Some(_)) => return Ordering::Greater,
             (Some(_), None) => return Ordering::Less,
             (Some(&&(v, n)), Some(&&(w, m))) => {
+                // Variables in the order of declaration, then higher powers first.
                 let order = v.cmp(&w).then(Reverse(n).cmp(&Reverse(m)));
                 if order != Ordering::Equal {
                     return order;
@@ -138,6 +149,7 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
     }
 }
 
+/// A polynomial as a sum of terms in the usual order.
 fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
     PrintedFormula::sum(
         ordered_terms(p).into_iter().map(|(powers, k)| {
@@ -146,7 +158,7 @@ fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Prin
     )
 }
 
-/// A number and the factors of a polynomial.
+/// The rational factor of a polynomial and its other factors.
 fn polynomial_factors(
     p: &TrigonometricPolynomial,
     mechanism: &Mechanism,
@@ -156,6 +168,7 @@ fn polynomial_factors(
         monomial,
         factors,
     } = factor::factor_polynomial(p);
+    // Monomial first, then the polynomials.
     let mut formulas = power_factors(&monomial, mechanism);
     for (base, n) in factors {
         let n = i32::try_from(n).unwrap_or(i32::MAX);
@@ -164,11 +177,14 @@ fn polynomial_factors(
     (number, formulas)
 }
 
-/// A sum whose quadratic terms are gathered to squares where they are some: `(r2 + r3)^2 + d3^2`.
+/// A sum whose quadratic terms are written as squares where they form some: `(r2 + r3)^2 + d3^2`.
 fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
+    // Terms that belong to no square.
     let mut rest = p.clone();
     let mut squares: BTreeMap<FactorVariable, PrintedFormula> = BTreeMap::new();
+    // Each square takes its terms out of the sum.
     for square in factor::find_squares(p) {
+        // Squares are ordered by their first variable.
         let first = square.linear[0].0;
         let sum = PrintedFormula::sum(
             square
@@ -184,6 +200,7 @@ fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Printed
             rest.remove(used);
         }
     }
+    // Squares first, then all other terms.
     let terms = ordered_terms(&rest)
         .into_iter()
         .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism)));

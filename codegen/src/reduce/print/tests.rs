@@ -1,4 +1,4 @@
-//! Factored text read again equals the function; what people expect to see factored is.
+//! Factored text, parsed again, equals the function, and expected factors are found.
 
 use std::collections::BTreeMap;
 

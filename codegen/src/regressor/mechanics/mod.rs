@@ -1,4 +1,4 @@
-//! Effects with mechanics of their own, see [`Mechanics`]: what those need that need forces, one file for each.
+//! Effects with mechanics of their own, see [`Mechanics`]: one file for each kind that needs forces.
 
 mod rod;
 mod strut;
@@ -11,8 +11,8 @@ use crate::expr::{ExprId, Graph};
 use crate::regressor::projection::LoopProjection;
 use crate::tree::KinematicTree;
 
-/// Generalised forces on all coordinates of the open tree that an effect needs, `[i][t][c]`: for each time `i` that it
-/// acts, for its term `t` with a parameter of one, on the coordinate `c`. Empty if it needs none.
+/// Generalised forces of an effect on all coordinates of the open tree, `[i][t][c]`: for its i-th place, for term `t`
+/// with a parameter of one, on coordinate `c`. Empty if the effect needs none.
 pub(crate) fn generalised_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,
@@ -26,14 +26,13 @@ pub(crate) fn generalised_forces(
             rod::generalised_forces(graph, mechanism, tree, projection, gravity, effect)
         }
         Some(Mechanics::Strut) => strut::generalised_forces(graph, mechanism, tree, effect),
-        // Their bodies are among those of the mechanism, and gravity is turned already.
+        // Their bodies are part of the mechanism's, and gravity is rotated already.
         Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
         | None => Ok(Vec::new()),
     }
 }
 
-/// Forces at points, in the axes of the base, that supply an effect with what it needs, for given values of its
-/// parameters.
+/// Forces at points, in the axes of the base, that balance an effect with given values of its parameters, N.
 pub(crate) fn point_forces(
     graph: &mut Graph,
     mechanism: &Mechanism,

@@ -1,4 +1,4 @@
-//! Units of the parameters and constants of laws, from the dimensions of what they multiply.
+//! Units of the parameters and constants of laws, derived from the variables that they multiply.
 
 use super::features::{LawFactor, LawProduct, LawSite};
 use super::shapes::LawVariable;
@@ -7,9 +7,11 @@ use super::shapes::LawVariable;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct LawUnit([i32; 4]);
 
+/// Names of the base units, in the order of the powers.
 const NAMES: [&str; 4] = ["N", "m", "rad", "s"];
 
 impl LawUnit {
+    /// Divides by another unit, raised to the power `times`.
     fn divide_by(mut self, other: Self, times: i32) -> Self {
         for (own, other) in self.0.iter_mut().zip(other.0) {
             *own -= times * other;
@@ -17,8 +19,9 @@ impl LawUnit {
         self
     }
 
-    /// As model files write it: `N s/(m rad)`.
+    /// The unit as model files write it, for example `N s/(m rad)`; "1" without unit.
     fn format_unit(self) -> String {
+        // Units with positive powers, then those with negative ones.
         let side = |sign: i32| -> Vec<String> {
             let powers = NAMES.iter().zip(self.0.map(|power| sign * power));
             powers
@@ -29,6 +32,7 @@ impl LawUnit {
                 })
                 .collect()
         };
+        // Numerator and denominator.
         let (above, below) = (side(1), side(-1));
         let above = if above.is_empty() {
             "1".to_owned()
@@ -43,12 +47,14 @@ impl LawUnit {
     }
 }
 
-/// Unit of what a place carries.
+/// Unit of the force at a place: N, or N m if it is revolute.
 fn force_unit(is_angle: bool) -> LawUnit {
     LawUnit([1, i32::from(is_angle), 0, 0])
 }
 
+/// Unit of a variable of a place or of another place.
 fn unit_of(variable: LawVariable, own_is_angle: bool, other_is_angle: bool) -> LawUnit {
+    // m or rad, divided by a power of s.
     let along = |is_angle: bool, over_time: i32| {
         LawUnit([0, i32::from(!is_angle), i32::from(is_angle), -over_time])
     };
@@ -63,9 +69,11 @@ fn unit_of(variable: LawVariable, own_is_angle: bool, other_is_angle: bool) -> L
 }
 
 impl LawProduct {
-    /// Unit of the parameter that it is multiplied by to be a force or torque at a place.
+    /// Unit of its parameter, such that the product is a force or torque at the place.
     pub fn unit(&self, site: &LawSite, sites: &[LawSite]) -> String {
+        // Whether the other place is revolute.
         let other = self.other.is_some_and(|other| sites[other].is_angle);
+        // Start from the unit of the force and divide by that of every factor.
         let unit = self
             .factors
             .iter()
@@ -78,7 +86,7 @@ impl LawProduct {
 }
 
 impl LawFactor {
-    /// Unit of the constants that bend it, which is that of its variable.
+    /// Unit of its constants, which is that of its variable.
     pub fn unit(&self, own_is_angle: bool, other_is_angle: bool) -> String {
         unit_of(self.variable, own_is_angle, other_is_angle).format_unit()
     }

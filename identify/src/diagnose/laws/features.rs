@@ -1,4 +1,5 @@
-//! The grammar of laws: products of one or two shapes of what a place does, carries, or sees another place do.
+//! The grammar of laws: products of one or two shapes of the motion or load of a place, or of the motion of another
+//! place. Input: positions, rates and loads; output: lists of factors that are tried.
 
 use super::shapes::{LawShape, LawShapeKind, LawVariable};
 use crate::diagnose::column::ForceColumn;
@@ -6,51 +7,54 @@ use crate::diagnose::column::ForceColumn;
 /// A place on which a law may act, along all recordings.
 #[derive(Clone, Debug, Default)]
 pub struct LawSite {
-    /// Its name.
+    /// Name of the place.
     pub name: String,
-    /// Whether it turns: rad and N m rather than m and N.
+    /// Whether it is revolute: rad and N m instead of m and N.
     pub is_angle: bool,
-    /// The drive that it is, if it is one.
+    /// Index of its channel, if it is a drive.
     pub channel: Option<usize>,
-    /// What the drives must supply for a force or torque of one there.
+    /// Forces of the drives per force or torque of one at the place.
     pub drive_forces: ForceColumn,
-    /// m or rad
+    /// Position at every sample, m or rad.
     pub position: Vec<f64>,
-    /// m/s or rad/s
+    /// Rate at every sample, m/s or rad/s.
     pub rate: Vec<f64>,
-    /// m/s^2 or rad/s^2
+    /// Acceleration at every sample, m/s^2 or rad/s^2.
     pub acceleration: Vec<f64>,
 }
 
-/// A shape of a variable.
+/// A shape applied to a variable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LawFactor {
-    /// What of.
+    /// The variable.
     pub variable: LawVariable,
-    /// Which function.
+    /// The function.
     pub shape: LawShape,
 }
 
 /// A product of shapes at a place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawProduct {
-    /// The other place that it has variables of, by number.
+    /// Index of the other place whose motion it depends on, if there is one.
     pub other: Option<usize>,
-    /// One or two.
+    /// One or two factors.
     pub factors: Vec<LawFactor>,
 }
 
-/// What products have in common that differ in their constants alone.
+/// Form of a product: equal for products that differ in their constants only.
 pub(crate) type ProductForm = (Option<usize>, Vec<(LawVariable, LawShapeKind)>);
 
 impl LawProduct {
+    /// Its form, without constants.
     pub(crate) fn product_form(&self) -> ProductForm {
         let of = |factor: &LawFactor| (factor.variable, factor.shape.shape_kind());
         (self.other, self.factors.iter().map(of).collect())
     }
 
-    /// How much it takes to write it down: factors, constants that are sought, parameters.
+    /// Length of its description, by which simple laws are preferred: factors, searched constants, uncommon shapes and
+    /// another place.
     pub(crate) fn description_length(&self) -> usize {
+        // A plain integer power counts one less than other shapes.
         let of = |factor: &LawFactor| {
             let is_plain =
                 matches!(factor.shape, LawShape::Power { halves, .. } if halves % 2 == 0);
@@ -59,20 +63,24 @@ impl LawProduct {
         self.factors.iter().map(of).sum::<usize>() + usize::from(self.other.is_some())
     }
 
-    /// Parameters that it is multiplied by: two where sine and cosine stand side by side.
+    /// Number of its parameters: two if sine and cosine are estimated separately.
     pub(crate) fn parameters(&self) -> usize {
+        // Only waves have two columns, sine and cosine.
         let waves = self.factors.iter();
         let waves = waves.filter(|factor| matches!(factor.shape, LawShape::Wave { .. }));
+        // Each wave doubles the number of columns.
         1 << waves.count()
     }
 
-    /// Whether it depends on the way there.
+    /// Whether it depends on the past motion and not only on the present state.
     pub fn has_memory(&self) -> bool {
         self.factors.iter().any(|factor| factor.shape.has_memory())
     }
 
-    /// Whether the library that comes with the program has it, so that a diagnosis has refused it already.
+    /// Whether the library that comes with the program contains it, so that the diagnosis has rejected it already.
     pub(crate) fn is_in_library(&self, site: &LawSite) -> bool {
+        // Laws that the library contains as effects: stiffness, damping, inertia, dry and quadratic friction, Stribeck
+        // friction, periodic forces, Dahl friction, and load-dependent friction.
         match self.factors.as_slice() {
             [LawFactor { variable, shape }] => match (variable, shape) {
                 (LawVariable::Position | LawVariable::Rate | LawVariable::Acceleration, shape)
@@ -103,32 +111,32 @@ impl LawProduct {
     }
 }
 
-/// Places along which waves, bumps and stops are looked for, as parts of the travel.
+/// Centres of local shapes, ends of hinges and zeros of powers, as shares of the travel.
 const CENTRES: [f64; 7] = [0.05, 0.2, 0.35, 0.5, 0.65, 0.8, 0.95];
 const ENDS: [f64; 6] = [0.05, 0.15, 0.28, 0.42, 0.57, 0.72];
 const MIDDLES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// Widths of what is near a place, as parts of the travel.
+/// Widths of local shapes, as shares of the travel.
 const WIDTHS: [f64; 3] = [0.04, 0.1, 0.25];
-/// Waves over the travel: up to so many, by steps that tell them apart.
+/// Least and largest number of waves over the travel, and the step between them at which they are distinguishable.
 const WAVES: [f64; 2] = [0.4, 24.0];
 const WAVE_STEP: f64 = 0.55;
-/// Scales of a rate, as parts of the largest.
+/// Scales of a rate, as shares of the largest rate.
 const SCALES: [f64; 6] = [0.01, 0.025, 0.06, 0.15, 0.35, 0.8];
-/// Lengths over which a state remembers, as parts of the travel.
+/// Lengths of states with memory, as shares of the travel.
 const LENGTHS: [f64; 7] = [0.005, 0.012, 0.03, 0.07, 0.15, 0.3, 0.6];
-/// Parts of the largest load.
+/// Loads at which hinges begin, as shares of the largest load.
 const LOADS: [f64; 4] = [0.3, 0.5, 0.65, 0.8];
 
-/// Shapes that are tried of each variable, alone and as factors.
+/// Factors that are tried, alone and in pairs.
 #[derive(Default)]
 pub(crate) struct FactorCatalog {
-    /// Alone.
+    /// Factors that are tried alone.
     pub(crate) single_factors: Vec<LawFactor>,
-    /// Pairs of lists of which every pair is tried.
+    /// Pairs of lists; every factor of one list is multiplied by every factor of the other.
     pub(crate) pairs: Vec<[Vec<LawFactor>; 2]>,
 }
 
-/// Least and largest value.
+/// Least and largest value of a series.
 pub(crate) fn range(z: &[f64]) -> [f64; 2] {
     z.iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
@@ -136,16 +144,18 @@ pub(crate) fn range(z: &[f64]) -> [f64; 2] {
         })
 }
 
-/// Root of the mean square.
+/// Root mean square of a series.
 fn root_mean_square(z: &[f64]) -> f64 {
     (z.iter().map(|z| z * z).sum::<f64>() / z.len().max(1) as f64).sqrt()
 }
 
+/// Factors of one variable with several shapes.
 fn factors_of(variable: LawVariable, shapes: impl IntoIterator<Item = LawShape>) -> Vec<LawFactor> {
     let factor = |shape| LawFactor { variable, shape };
     shapes.into_iter().map(factor).collect()
 }
 
+/// A power with the exponent `halves / 2`.
 fn half_power(halves: i32, is_odd: bool, scale: f64) -> LawShape {
     LawShape::Power {
         halves,
@@ -154,14 +164,18 @@ fn half_power(halves: i32, is_odd: bool, scale: f64) -> LawShape {
     }
 }
 
-/// How far a place travels and how fast, of which shapes have their sizes.
+/// Range and largest rate of a place, from which the constants of shapes are chosen.
 struct TravelExtent {
+    /// Least position, m or rad.
     low: f64,
+    /// Range of the position, m or rad.
     travel: f64,
+    /// Largest magnitude of the rate, m/s or rad/s.
     fastest: f64,
 }
 
 impl TravelExtent {
+    /// Determines the extent from positions and rates.
     fn new(position: &[f64], rate: &[f64]) -> Self {
         let [low, high] = range(position);
         Self {
@@ -171,10 +185,12 @@ impl TravelExtent {
         }
     }
 
+    /// Position at a share of the travel.
     fn position_at(&self, part: f64) -> f64 {
         self.low + part * self.travel
     }
 
+    /// Powers around positions in the middle of the travel.
     fn shifted_powers(&self, power: i32) -> impl Iterator<Item = LawShape> {
         MIDDLES.into_iter().map(move |part| LawShape::Shifted {
             centre: self.position_at(part),
@@ -182,8 +198,10 @@ impl TravelExtent {
         })
     }
 
+    /// Hinges that begin near either end.
     fn hinge_shapes(&self, power: i32) -> impl Iterator<Item = LawShape> {
         ENDS.into_iter().flat_map(move |part| {
+            // A hinge near the upper end acts upwards, one near the lower end downwards.
             let ends = [
                 (1.0, self.position_at(1.0 - part)),
                 (-1.0, self.position_at(part)),
@@ -192,6 +210,7 @@ impl TravelExtent {
         })
     }
 
+    /// Waves of all pitches.
     fn wave_shapes(&self) -> Vec<LawShape> {
         let mut waves = Vec::new();
         let mut times = WAVES[0];
@@ -204,6 +223,7 @@ impl TravelExtent {
         waves
     }
 
+    /// Local shapes of some widths along the travel.
     fn local_shapes(&self, make: fn(f64, f64) -> LawShape, widths: &[f64]) -> Vec<LawShape> {
         let each = widths.iter().flat_map(|width| {
             CENTRES.map(move |centre| make(self.position_at(centre), width * self.travel))
@@ -211,7 +231,9 @@ impl TravelExtent {
         each.collect()
     }
 
+    /// States with memory, for all lengths: friction curves of two kinds and a dragged spring.
     fn memory_shapes(&self) -> Vec<LawShape> {
+        // Dahl's and Bouc-Wen's model for all lengths.
         let curves = [1, 2].into_iter().flat_map(|curve| {
             LENGTHS.map(move |part| LawShape::Memory {
                 length: part * self.travel,
@@ -224,10 +246,12 @@ impl TravelExtent {
         curves.chain(slips).collect()
     }
 
+    /// Smooth signs of the rate.
     fn step_shapes(&self) -> [LawShape; SCALES.len()] {
         SCALES.map(|part| step(0.0, part * self.fastest))
     }
 
+    /// Shapes that decrease with speed; the exponent is `halves / 2`.
     fn fading_shapes(&self, halves: i32) -> [LawShape; SCALES.len()] {
         SCALES.map(|part| LawShape::Fading {
             scale: part * self.fastest,
@@ -236,27 +260,33 @@ impl TravelExtent {
     }
 }
 
+/// Largest absolute value of a series.
 fn largest_magnitude(values: &[f64]) -> f64 {
     range(values).map(f64::abs).into_iter().fold(0.0, f64::max)
 }
 
+/// A bump; for lists of local shapes.
 fn bump(centre: f64, width: f64) -> LawShape {
     LawShape::Bump { centre, width }
 }
 
+/// A detent; for lists of local shapes.
 fn detent(centre: f64, width: f64) -> LawShape {
     LawShape::Detent { centre, width }
 }
 
+/// A smooth step; for lists of local shapes.
 fn step(centre: f64, width: f64) -> LawShape {
     LawShape::Step { centre, width }
 }
 
-/// What is tried of a place by itself.
+/// Factors that are tried for a place by itself, from its motion and its load, if it has one.
 pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) -> FactorCatalog {
     use LawVariable::{Acceleration, Position, Rate};
+    // Ranges from which all constants are chosen.
     let extent = TravelExtent::new(position, rate);
     let scale = root_mean_square(rate);
+    // Friction or damping that acts in one direction only.
     let directions = [1.0, -1.0].map(|side| LawShape::Hinge {
         from: 0.0,
         side,
@@ -267,7 +297,9 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         LawShape::integer_power(2, false),
         LawShape::integer_power(3, true),
     ];
+    // Factors alone; pairs follow below.
     let mut menu = FactorCatalog::default();
+    // Functions of the position: springs, stops, waves, bumps, detents and friction with memory.
     let alone = &mut menu.single_factors;
     alone.extend(factors_of(Position, powers));
     alone.extend(factors_of(
@@ -286,6 +318,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         extent.local_shapes(step, &WIDTHS[..1]),
     ));
     alone.extend(factors_of(Position, extent.memory_shapes()));
+    // Functions of the rate: friction and damping.
     let speeds = [
         LawShape::SIGN,
         LawShape::LINEAR,
@@ -305,6 +338,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
     for halves in [1, 2, 4] {
         alone.extend(factors_of(Rate, extent.fading_shapes(halves)));
     }
+    // Shapes around the rate zero describe friction near a reversal.
     for make in [bump, detent] {
         let slow = SCALES.map(|part| make(0.0, part * extent.fastest));
         alone.extend(factors_of(Rate, slow));
@@ -313,7 +347,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         Acceleration,
         [LawShape::LINEAR, LawShape::MAGNITUDE],
     ));
-    // Friction and damping that differ from place to place, and mass that does.
+    // Friction, damping and mass that depend on the position.
     let ways = [
         LawShape::LINEAR,
         LawShape::SIGN,
@@ -322,6 +356,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         extent.step_shapes()[2],
         extent.step_shapes()[4],
     ];
+    // Functions of the position by which these are multiplied.
     let some = [LawShape::LINEAR, LawShape::integer_power(2, false)].into_iter();
     let some = some
         .chain(extent.shifted_powers(2))
@@ -338,22 +373,26 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         simple_positions(),
         factors_of(Acceleration, [LawShape::LINEAR]),
     ]);
+    // The load is known for drives only.
     if let Some(load) = load {
         add_loads(&mut menu, &extent, load);
     }
     menu
 }
 
+/// The position and its square.
 fn simple_positions() -> Vec<LawFactor> {
     let shapes = [LawShape::LINEAR, LawShape::integer_power(2, false)];
     factors_of(LawVariable::Position, shapes)
 }
 
-/// What is tried of a load, by itself, with rates and with positions.
+/// Adds factors of the load: alone, with rates and with positions.
 fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
     use LawVariable::{Load, Rate};
+    // Scales of the load.
     let largest = largest_magnitude(load);
     let scale = root_mean_square(load);
+    // Powers of the load, with and without its sign.
     let mut loads = vec![
         LawShape::LINEAR,
         LawShape::MAGNITUDE,
@@ -361,6 +400,7 @@ fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
         LawShape::integer_power(2, true),
     ];
     loads.extend([1, 3].map(|n| half_power(n, false, scale)));
+    // Loads that act only beyond a limit, in either direction.
     let cut = LOADS.into_iter().flat_map(|part| {
         [1.0, -1.0].map(|side| LawShape::Hinge {
             from: side * part * largest,
@@ -371,6 +411,7 @@ fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
     menu.single_factors
         .extend(factors_of(Load, loads.iter().copied()));
     menu.single_factors.extend(factors_of(Load, cut));
+    // Load-dependent friction of all kinds.
     let mut speeds = vec![LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
     speeds.extend(extent.step_shapes());
     speeds.extend(extent.fading_shapes(4));
@@ -382,7 +423,7 @@ fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
         .push([factors_of(Load, loads), simple_positions()]);
 }
 
-/// What is tried of another place, alone and with what the place does by itself.
+/// Factors that are tried for the motion of another place, alone and multiplied by the own motion.
 pub(crate) fn factors_with_other(
     own_rate: &[f64],
     position: &[f64],
@@ -391,8 +432,10 @@ pub(crate) fn factors_with_other(
 ) -> FactorCatalog {
     use LawVariable::{Acceleration, OtherPosition, OtherRate, Position, Rate};
     let [low, high] = range(position);
+    // Scales of the constants: ranges and largest rates of both places.
     let (fastest, own_fastest) = (largest_magnitude(rate), largest_magnitude(own_rate));
     let travel = high - low;
+    // Functions of the other position.
     let mut places = vec![
         LawShape::LINEAR,
         LawShape::integer_power(2, false),
@@ -402,21 +445,26 @@ pub(crate) fn factors_with_other(
         centre: low + part * travel,
         power: 2,
     }));
+    // A revolute joint may act once or twice per turn.
     if is_angle {
+        // Full and half turns.
         let turns = [1.0, 0.5].map(|part| LawShape::Wave {
             pitch: part * std::f64::consts::TAU,
         });
         places.extend(turns);
     }
+    // Waves over the travel of the other place.
     let waves = [0.5, 1.0, 1.6, 2.3, 3.2].map(|times| LawShape::Wave {
         pitch: travel / times,
     });
+    // Smooth signs of a rate.
     let steps = |fastest: f64| {
         [0.02, 0.15, 0.5].map(|part| LawShape::Step {
             centre: 0.0,
             width: part * fastest,
         })
     };
+    // Functions of the other rate.
     let mut rates = vec![
         LawShape::LINEAR,
         LawShape::SIGN,
@@ -425,6 +473,7 @@ pub(crate) fn factors_with_other(
         LawShape::integer_power(2, false),
     ];
     rates.extend(steps(fastest));
+    // Own motion: rates of several shapes, later also position and acceleration.
     let mut own_rates = vec![
         LawShape::LINEAR,
         LawShape::SIGN,
@@ -433,17 +482,20 @@ pub(crate) fn factors_with_other(
         LawShape::integer_power(2, false),
     ];
     own_rates.push(steps(own_fastest)[1]);
+    // Alone, roots of the other rate are tried as well.
     let mut alone_rates = rates.clone();
     let scale = root_mean_square(rate);
     for n in [1, 3] {
         alone_rates.extend([true, false].map(|is_odd| half_power(n, is_odd, scale)));
     }
+    // Factors of the own motion, by which those of the other place are multiplied.
     let own = || {
         let mut all = factors_of(Rate, own_rates.iter().copied());
         all.extend(factors_of(Position, [LawShape::LINEAR]));
         all.extend(factors_of(Acceleration, [LawShape::LINEAR]));
         all
     };
+    // Functions of the other motion alone, then their products with the own motion and with each other.
     let mut alone = factors_of(OtherPosition, places.iter().copied().chain(waves));
     alone.extend(factors_of(OtherRate, alone_rates));
     let few = [LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];

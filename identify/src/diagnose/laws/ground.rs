@@ -1,5 +1,6 @@
-//! The ground on which products are scored: what the base parameters and the effects that were found take up is projected out of
-//! every column and of what is left, each channel in units of its noise, by inner products over some samples.
+//! Scores of products. The base parameters and the effects found are projected out of every column and of the residual,
+//! each channel relative to its noise, by inner products over selected samples. Input: products of the grammar; output:
+//! what each explains.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,28 +9,31 @@ use super::features::{
 };
 use super::shapes::LawVariable;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
+use crate::diagnose::thresholds::LAW_INDEPENDENCE_TOLERANCE;
 
-/// A column of which others leave a smaller share of squares than this says nothing new.
-const INDEPENDENCE_TOLERANCE: f64 = 1e-5;
-/// Columns of products that are looked at at once.
+/// Number of columns that are scored at the same time.
 const BATCH: usize = 64;
 
-/// Samples of all recordings that are looked at, and what places do along them.
+/// Selected samples of all recordings, with the motion of the places.
 pub(crate) struct LawSamples<'a> {
+    /// All places, with complete series.
     pub(crate) sites: &'a [LawSite],
+    /// Load of each place at every sample, N or N m; `None` where it is unknown.
     loads: &'a [Option<Vec<f64>>],
-    /// Which samples.
+    /// Indices of the selected samples, ascending.
     pub(crate) picked: Vec<usize>,
-    /// Where stretches begin, among all samples.
+    /// First sample of each segment.
     starts: Vec<usize>,
-    /// Position, rate, acceleration and load of each place.
+    /// Position, rate, acceleration and load of each place at the selected samples; the load is empty where it is
+    /// unknown.
     tracks: Vec<[Vec<f64>; 4]>,
-    /// What the drives must supply for one at each place, in units of the noise; `None` on channels that do not feel it.
+    /// Forces of the drives per unit force at each place, `[place][channel][sample]`, relative to the noise; `None` on
+    /// channels without effect.
     forces: Vec<Vec<Option<Vec<f64>>>>,
 }
 
 impl<'a> LawSamples<'a> {
-    /// About `most` samples; `deviations` is the noise of each channel.
+    /// Selects at most `most` samples at equal distances; `deviations` are the standard deviations of the channels.
     pub(crate) fn new(
         bench: &EffectSelector<'_>,
         sites: &'a [LawSite],
@@ -39,6 +43,7 @@ impl<'a> LawSamples<'a> {
     ) -> Self {
         let layout = &bench.problem.layout;
         let n = layout.samples();
+        // Equally spaced samples over all recordings.
         let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
         let some = |values: &[f64]| -> Vec<f64> { picked.iter().map(|i| values[*i]).collect() };
         let track = |(site, load): (&LawSite, &Option<Vec<f64>>)| {
@@ -50,6 +55,7 @@ impl<'a> LawSamples<'a> {
             ]
         };
         let tracks = sites.iter().zip(loads).map(track).collect();
+        // Excluded samples have no force, so that they do not count in any product.
         let forces = sites.iter().map(|site| {
             let channels = site.drive_forces.0.iter().enumerate().map(|(d, values)| {
                 let mut values = values.clone()?;
@@ -60,6 +66,7 @@ impl<'a> LawSamples<'a> {
             channels.collect()
         });
         let mut start = 0;
+        // First sample of each segment, counted over all segments.
         let starts = layout.segments.iter().map(|stretch| {
             let this = start;
             start += stretch.samples;
@@ -75,6 +82,7 @@ impl<'a> LawSamples<'a> {
         }
     }
 
+    /// A variable at the selected samples.
     fn track(&self, site: usize, other: Option<usize>, variable: LawVariable) -> &[f64] {
         let (at, which) = variable_place(site, other, variable);
         &self.tracks[at][which]
@@ -85,7 +93,7 @@ impl<'a> LawSamples<'a> {
         range(self.track(site, product.other, product.factors[factor].variable))
     }
 
-    /// A factor along the samples.
+    /// Columns of a factor at the selected samples: one, or two for sine and cosine.
     fn factor_columns(
         &self,
         site: usize,
@@ -96,15 +104,17 @@ impl<'a> LawSamples<'a> {
             let track = self.track(site, other, factor.variable);
             return factor.shape.values(track, &[0]);
         }
-        // What remembers must see all of the way.
+        // A state with memory is integrated over all samples.
+        // The state is evaluated along the complete series and then reduced to the selected samples.
         let (at, _) = variable_place(site, other, factor.variable);
         let whole = factor.shape.values(&self.sites[at].position, &self.starts);
         let some = |values: Vec<f64>| self.picked.iter().map(|i| values[*i]).collect();
         whole.into_iter().map(some).collect()
     }
 
-    /// The columns of a product: channels on which the place is felt one after the other.
+    /// Columns of a product: forces on the channels on which the place has an effect, one channel after the other.
     pub(crate) fn columns(&self, site: usize, product: &LawProduct) -> Vec<Vec<f64>> {
+        // A product of two waves has all combinations of sines and cosines.
         let mut columns = vec![vec![1.0; self.picked.len()]];
         for factor in &product.factors {
             let shapes = self.factor_columns(site, product.other, factor);
@@ -116,7 +126,7 @@ impl<'a> LawSamples<'a> {
             .collect()
     }
 
-    /// What the drives must supply for a force at a place, channel after channel, in units of the noise.
+    /// Forces of the drives for a force at a place, one channel after the other, relative to the noise.
     fn drive_forces(&self, site: usize, values: &[f64]) -> Vec<f64> {
         let mut rows = Vec::with_capacity(values.len());
         for force in self.forces[site].iter().flatten() {
@@ -125,19 +135,20 @@ impl<'a> LawSamples<'a> {
         rows
     }
 
-    /// Channels on which a place is felt.
+    /// Indices of the channels on which a force at a place has an effect.
     pub(crate) fn channels(&self, site: usize) -> Vec<usize> {
         let of = self.forces[site].iter().enumerate();
         of.filter_map(|(d, force)| force.as_ref().map(|_| d))
             .collect()
     }
 
-    /// What is tried at a place: by itself, and with each other place that `wanted` names.
+    /// Factors that are tried at a place, alone and with each other place for which `wanted` is true.
     fn factor_catalogs(
         &self,
         site: usize,
         wanted: &dyn Fn(usize) -> bool,
     ) -> Vec<(Option<usize>, FactorCatalog)> {
+        // The motion at the place itself comes first.
         let [position, rate, _, _] = &self.tracks[site];
         let load = self.loads[site].as_ref().map(|_| &self.tracks[site][3][..]);
         let mut menus = vec![(None, own_factors(position, rate, load))];
@@ -154,7 +165,7 @@ impl<'a> LawSamples<'a> {
     }
 }
 
-/// The place whose variable it is, and which of its tracks.
+/// Index of the place that a variable belongs to, and of its series among the four of that place.
 fn variable_place(site: usize, other: Option<usize>, variable: LawVariable) -> (usize, usize) {
     let away = other.unwrap_or(site);
     match variable {
@@ -167,7 +178,7 @@ fn variable_place(site: usize, other: Option<usize>, variable: LawVariable) -> (
     }
 }
 
-/// Every product of two lists of columns.
+/// All products of two lists of columns.
 fn pairwise_products(some: &[Vec<f64>], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).collect();
     some.iter()
@@ -175,32 +186,37 @@ fn pairwise_products(some: &[Vec<f64>], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// A product with what it explains.
+/// A product with its score.
 #[derive(Clone, Debug)]
 pub(crate) struct ScoredProduct {
+    /// Index of its place.
     pub(crate) site: usize,
+    /// The product.
     pub(crate) product: LawProduct,
-    /// Squares that it takes off, in units of the noise.
+    /// Decrease of the squared residual, relative to the noise.
     pub(crate) score: f64,
 }
 
-/// What is projected out, and what is left.
+/// Orthonormal basis of what is projected out, and the residual.
 #[derive(Clone)]
 pub(crate) struct LawProjection {
+    /// Number of samples of each channel.
     samples: usize,
-    /// Orthonormal columns, channels one after the other.
+    /// Orthonormal columns; rows are the channels one after the other.
     basis: DMatrix<f64>,
+    /// Measured forces with the basis projected out, relative to the noise.
     residual: DVector<f64>,
 }
 
 impl LawProjection {
-    /// Beside a set of effects.
+    /// Projects out the base parameters and a set of effects.
     pub(crate) fn new(
         bench: &EffectSelector<'_>,
         picks: &[SelectedEffect],
         samples: &LawSamples<'_>,
         deviations: &[f64],
     ) -> Self {
+        // A column of the pool as one vector: channels one after the other, each relative to its noise.
         let stacked = |column: usize| {
             let channels = bench.pool.column(column).0.iter().enumerate();
             let values = channels.flat_map(|(d, values)| {
@@ -218,12 +234,13 @@ impl LawProjection {
             basis: DMatrix::zeros(deviations.len() * samples.picked.len(), 0),
             residual: stacked(bench.measured),
         };
+        // Project the base and the set out of the measured forces; the rest is the residual.
         let columns = bench.columns(picks);
         ground.project_out(columns.into_iter().map(stacked));
         ground
     }
 
-    /// Takes further columns up.
+    /// Projects out further columns (Gram-Schmidt, each column twice against rounding).
     fn project_out(&mut self, columns: impl Iterator<Item = DVector<f64>>) {
         let mut basis: Vec<DVector<f64>> = self
             .basis
@@ -232,6 +249,7 @@ impl LawProjection {
             .collect();
         for column in columns {
             let mut left = column.clone();
+            // Twice, since the first pass has rounding errors.
             for _ in 0..2 {
                 for direction in &basis {
                     let share = direction.dot(&left);
@@ -239,6 +257,7 @@ impl LawProjection {
                 }
             }
             let size = left.norm();
+            // Dependent columns add no direction.
             if size * size > 1e-12 * column.norm_squared() {
                 basis.push(left / size);
             }
@@ -253,16 +272,18 @@ impl LawProjection {
         self.basis = DMatrix::from_columns(&basis);
     }
 
-    /// The same beside a product at a place.
+    /// A copy with a product at a place projected out as well.
     pub(crate) fn conditional_on_product(
         &self,
         samples: &LawSamples<'_>,
         site: usize,
         product: &LawProduct,
     ) -> Self {
+        // The residual is projected again together with the basis.
         let mut more = self.clone();
         let n = self.samples;
         let channels = samples.channels(site);
+        // Extend the columns by zeros on the channels without effect.
         let whole = samples.columns(site, product).into_iter().map(|rows| {
             let mut whole = DVector::zeros(self.residual.len());
             for (part, d) in rows.chunks(n).zip(&channels) {
@@ -274,11 +295,13 @@ impl LawProjection {
         more
     }
 
-    /// The part that feels a place.
+    /// The rows of the channels on which a place has an effect.
     pub(crate) fn project_at_site(&self, samples: &LawSamples<'_>, site: usize) -> SiteProjection {
         let n = self.samples;
         let channels = samples.channels(site);
+        // Rows of the stacked vectors that belong to these channels.
         let rows: Vec<usize> = channels.iter().flat_map(|d| d * n..(d + 1) * n).collect();
+        // The basis is transposed, so that it multiplies columns from the left.
         let k = self.basis.ncols();
         SiteProjection {
             site,
@@ -288,22 +311,23 @@ impl LawProjection {
     }
 }
 
-/// Rows of the ground on the channels that feel a place.
+/// Rows of a projection for the channels on which a place has an effect.
 pub(crate) struct SiteProjection {
     site: usize,
-    /// Transposed, as products with many columns need it.
+    /// Transposed basis, as products with many columns need it.
     basis: DMatrix<f64>,
     residual: DVector<f64>,
 }
 
 impl SiteProjection {
-    /// What one product takes off.
+    /// Score of one product.
     pub(crate) fn score(&self, samples: &LawSamples<'_>, product: &LawProduct) -> f64 {
         let columns = samples.columns(self.site, product);
         self.scores(&columns, &[columns.len()])[0]
     }
 
-    /// What every product of the grammar takes off, beside others that `wanted` names; those that take nothing off are left out.
+    /// Scores every product of the grammar at the place, with other places for which `wanted` is true. Products that
+    /// explain nothing are omitted.
     pub(crate) fn screen_products(
         &self,
         samples: &LawSamples<'_>,
@@ -313,10 +337,12 @@ impl SiteProjection {
         let mut batch = ProductBatch::default();
         let mut scored = Vec::new();
         for (other, menu) in samples.factor_catalogs(site, wanted) {
+            // Columns of a list of factors, evaluated once for all pairs.
             let list = |factors: &[LawFactor]| -> Vec<Vec<Vec<f64>>> {
                 let of = |factor| samples.factor_columns(site, other, factor);
                 factors.iter().map(of).collect()
             };
+            // Products of one factor.
             for factor in &menu.single_factors {
                 let product = LawProduct {
                     other,
@@ -327,6 +353,7 @@ impl SiteProjection {
                 batch.add(product, felt.collect());
                 batch.score_batch(self, BATCH, &mut scored);
             }
+            // Products of two factors.
             for [some, others] in &menu.pairs {
                 let (a, b) = (list(some), list(others));
                 for (first, a) in some.iter().zip(&a) {
@@ -343,14 +370,17 @@ impl SiteProjection {
                 }
             }
         }
+        // Score the last batch.
         batch.score_batch(self, 1, &mut scored);
         scored
     }
 
-    /// Squares that groups of columns take off; each group has one or two.
+    /// Decrease of the squared residual for groups of columns; `counts` gives the number of columns of each group, one
+    /// or two.
     fn scores(&self, columns: &[Vec<f64>], counts: &[usize]) -> Vec<f64> {
         let rows = self.residual.len();
         let matrix = DMatrix::from_iterator(rows, columns.len(), columns.iter().flatten().copied());
+        // Products of all columns with the basis and with the residual, in two matrix products.
         let taken = &self.basis * &matrix;
         let with_rest = matrix.tr_mul(&self.residual);
         let product = |i: usize, j: usize| {
@@ -358,24 +388,30 @@ impl SiteProjection {
         };
         let mut at = 0;
         let of_group = |count: &usize| {
+            // Indices of the one or two columns of the group.
             let (i, j) = (at, at + 1);
             at += count;
             let own = product(i, i);
+            // Whether a column depends on what is projected out.
             let is_said = |own: f64, k: usize| {
-                !own.is_finite() || own <= INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
+                !own.is_finite()
+                    || own <= LAW_INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
             };
             if is_said(own, i) {
                 return 0.0;
             }
+            // Decrease of the squares by one column: the squared product with the residual over its own square.
             let first = with_rest[i] * with_rest[i] / own;
             if *count == 1 {
                 return first;
             }
+            // Second column of the group: the part that is orthogonal to the first.
             let across = product(i, j);
             let beside = product(j, j) - across * across / own;
             if is_said(beside, j) {
                 return first;
             }
+            // Product of the second column's orthogonal part with the residual.
             let left = with_rest[j] - across / own * with_rest[i];
             first + left * left / beside
         };
@@ -383,23 +419,25 @@ impl SiteProjection {
     }
 }
 
-/// Products whose columns wait for their inner products.
+/// Products whose columns are collected for one matrix product.
 #[derive(Default)]
 struct ProductBatch {
     products: Vec<LawProduct>,
-    /// Columns of each.
+    /// Number of columns of each product.
     counts: Vec<usize>,
+    /// Their columns, one product after the other.
     columns: Vec<Vec<f64>>,
 }
 
 impl ProductBatch {
+    /// Adds a product with its columns.
     fn add(&mut self, product: LawProduct, columns: Vec<Vec<f64>>) {
         self.products.push(product);
         self.counts.push(columns.len());
         self.columns.extend(columns);
     }
 
-    /// Scores those that wait if there are so many.
+    /// Scores the collected products and empties the batch, if it has at least `least` columns.
     fn score_batch(
         &mut self,
         part: &SiteProjection,
@@ -410,6 +448,7 @@ impl ProductBatch {
             return;
         }
         let scores = part.scores(&self.columns, &self.counts);
+        // Products that explain nothing are dropped here, so that lists stay short.
         let all = std::mem::take(&mut self.products).into_iter().zip(scores);
         scored.extend(
             all.filter(|(_, score)| *score > 0.0)

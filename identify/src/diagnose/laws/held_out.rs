@@ -1,5 +1,5 @@
-//! What laws take off where they were not fitted: blocks of time take turns, and those of the check are foretold by the recordings
-//! of the fit alone.
+//! Validation of laws on data to which they were not fitted. Each block of the fit is predicted from all other blocks,
+//! and blocks of validation runs are predicted from the recordings of the fit alone.
 
 use std::ops::Range;
 
@@ -12,40 +12,45 @@ use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 use crate::diagnose::noise::effective_samples;
 use crate::diagnose::pool::{dot, solve_gram};
 
-/// Blocks of each stretch.
+/// Largest number of blocks of each segment.
 const BLOCKS: usize = 12;
 
-/// Inner products by blocks of what is known and what is left; the base alone is one of the laws.
+/// Inner products by block of the columns of base and effects and of the residual.
 pub(crate) struct BlockValidation {
-    /// Blocks of the samples that are looked at.
+    /// Ranges of the selected samples.
     blocks: Vec<Range<usize>>,
+    /// Whether each block belongs to a validation run.
     is_check: Vec<bool>,
-    /// Columns of base and effects, then what is left, `[channel][column]`.
+    /// Columns of base and effects, then the residual, `[channel][column][sample]`, relative to the noise. Empty where
+    /// a column is zero.
     columns: Vec<Vec<Vec<f64>>>,
-    /// Their inner products on each block, over all channels.
+    /// Inner products of the columns on each block, summed over all channels.
     grams: Vec<DMatrix<f64>>,
 }
 
-/// A law along time that it was not fitted to.
+/// A law with its error on data to which it was not fitted.
 #[derive(Clone, Debug)]
 pub(crate) struct ValidatedLaw {
-    /// Squares that it leaves of each block, in units of the noise.
+    /// Squared residual of each block, relative to the noise.
     pub(crate) block_squares: Vec<f64>,
-    /// Its parameters, from all blocks.
+    /// Estimates of its parameters from all blocks.
     pub(crate) values: Vec<f64>,
-    /// Their deviations, by how they differ where blocks are left out.
+    /// Their standard deviations, from the estimates with single blocks left out (jackknife).
     pub(crate) standard_deviations: Vec<f64>,
-    /// Factors of all columns, from all blocks.
+    /// Factors of all columns from all blocks, then -1 for the residual.
     factors: DVector<f64>,
 }
 
 impl ValidatedLaw {
+    /// Squared residual of all blocks, relative to the noise.
     pub(crate) fn total(&self) -> f64 {
         self.block_squares.iter().sum()
     }
 
-    /// By how much more it leaves than another, and the deviation of that over the blocks.
+    /// Difference of the squared residual to that of another law, and the standard deviation of this difference over
+    /// the blocks.
     pub(crate) fn excess_over(&self, other: &Self) -> (f64, f64) {
+        // Differences block by block, since both laws have the same noise there.
         let differences: Vec<f64> = self
             .block_squares
             .iter()
@@ -60,6 +65,8 @@ impl ValidatedLaw {
 }
 
 impl BlockValidation {
+    /// Prepares the columns of a set of effects with the residual `rest`; `deviations` are the standard deviations by
+    /// which channels are divided.
     pub(crate) fn new(
         bench: &EffectSelector<'_>,
         picks: &[SelectedEffect],
@@ -69,16 +76,21 @@ impl BlockValidation {
     ) -> Self {
         let layout = &bench.problem.layout;
         let fit = layout.fit_samples();
+        // Blocks of samples become ranges among the selected samples.
         let at = |sample: usize| samples.picked.partition_point(|i| *i < sample);
+        // Blocks of all recordings; those behind the fit are validation blocks.
         let all = layout.blocks(BLOCKS);
         let is_check = all.iter().map(|block| block.start >= fit).collect();
         let blocks: Vec<Range<usize>> = all.iter().map(|b| at(b.start)..at(b.end)).collect();
+        // Selected samples of a channel, relative to its noise.
         let some = |d: usize, values: &[f64]| -> Vec<f64> {
             let scaled = samples.picked.iter().map(|i| values[*i] / deviations[d]);
             scaled.collect()
         };
+        // Columns of base and effects on each channel, then the residual as the last one.
         let columns: Vec<Vec<Vec<f64>>> = (0..deviations.len())
             .map(|d| {
+                // Excluded samples are zero, so that they do not count.
                 let mut all: Vec<Vec<f64>> = (bench.columns(picks).iter())
                     .map(|k| match bench.pool.column(*k).0[d].clone() {
                         Some(mut values) => {
@@ -100,11 +112,12 @@ impl BlockValidation {
         }
     }
 
-    /// Puts a law to what is known.
+    /// Adds the columns of a law, before the residual.
     pub(crate) fn add_law(&mut self, samples: &LawSamples<'_>, site: usize, terms: &[LawProduct]) {
         let channels = samples.channels(site);
         for column in terms.iter().flat_map(|term| samples.columns(site, term)) {
             for (d, columns) in self.columns.iter_mut().enumerate() {
+                // On channels without effect of the law the new column is empty.
                 let part = channels.iter().position(|channel| *channel == d);
                 let k = samples.picked.len();
                 let own = part.map_or_else(Vec::new, |p| column[p * k..(p + 1) * k].to_vec());
@@ -114,7 +127,7 @@ impl BlockValidation {
         self.grams = block_grams(&self.blocks, &self.columns);
     }
 
-    /// A law of some products at a place, fitted and held out.
+    /// Fits a law of some products at a place and validates it.
     pub(crate) fn validate_law(
         &self,
         samples: &LawSamples<'_>,
@@ -122,29 +135,35 @@ impl BlockValidation {
         terms: &[LawProduct],
     ) -> ValidatedLaw {
         let channels = samples.channels(site);
+        // Columns of the law on the channels on which it has an effect.
         let own: Vec<Vec<f64>> = (terms.iter())
             .flat_map(|term| samples.columns(site, term))
             .collect();
         let k = samples.picked.len();
+        // Number of known columns, without the residual.
         let n = self.grams.first().map_or(0, DMatrix::nrows) - 1;
         let m = own.len();
-        // Base, law, rest.
+        // Inner products of one block in the order: base and effects, law, residual.
         let of_block = |(block, gram): (&Range<usize>, &DMatrix<f64>)| {
             let mut whole = DMatrix::zeros(n + m + 1, n + m + 1);
+            // Known columns keep their index; the residual moves behind the law.
             let place = |i: usize| if i < n { i } else { n + m };
             for i in 0..=n {
                 for j in 0..=n {
                     whole[(place(i), place(j))] = gram[(i, j)];
                 }
             }
+            // Add the products of the law's columns.
             for (a, column) in own.iter().enumerate() {
                 for (part, d) in channels.iter().enumerate() {
                     let values = &column[part * k..(part + 1) * k];
+                    // Products of the law with the known columns and the residual.
                     for (i, other) in self.columns[*d].iter().enumerate() {
                         let product = product_on_block(block, values, other);
                         whole[(n + a, place(i))] += product;
                         whole[(place(i), n + a)] += product;
                     }
+                    // Products of the law's columns with each other.
                     for (b, other) in own.iter().enumerate().take(a + 1) {
                         let product =
                             product_on_block(block, values, &other[part * k..(part + 1) * k]);
@@ -157,22 +176,27 @@ impl BlockValidation {
             }
             whole
         };
+        // Sums over blocks replace further passes over the samples.
         let grams: Vec<DMatrix<f64>> = self.blocks.iter().zip(&self.grams).map(of_block).collect();
         let zero = || DMatrix::zeros(n + m + 1, n + m + 1);
+        // Sums over all blocks, and over those of the fit.
         let whole = grams.iter().fold(zero(), |sum, gram| sum + gram);
         let of_fit = grams
             .iter()
             .zip(&self.is_check)
             .filter(|(_, check)| !**check);
         let of_fit = of_fit.fold(zero(), |sum, (gram, _)| sum + gram);
+        // Factors with -1 appended, so that the squared residual is f' G f.
         let fitted = |gram: &DMatrix<f64>| -> DVector<f64> {
             let (factors, _) = solve_gram(gram);
             factors.push(-1.0)
         };
+        // Factors from the fit alone predict the validation runs.
         let by_fit = fitted(&of_fit);
         let mut left = Vec::new();
         let mut others: Vec<Vec<f64>> = Vec::new();
         for (gram, is_check) in grams.iter().zip(&self.is_check) {
+            // Validation blocks are predicted from the fit; a block of the fit from all other blocks.
             let factors = if *is_check {
                 by_fit.clone()
             } else {
@@ -180,10 +204,12 @@ impl BlockValidation {
                 others.push(factors.as_slice()[n..n + m].to_vec());
                 factors
             };
+            // Squared residual of the block with these factors.
             left.push(factors.dot(&(gram * &factors)).max(0.0));
         }
         let factors = fitted(&whole);
         let values = factors.as_slice()[n..n + m].to_vec();
+        // Jackknife standard deviation from the estimates without single blocks.
         let count = others.len() as f64;
         let deviation = |a: usize| {
             let mean = others.iter().map(|one| one[a]).sum::<f64>() / count;
@@ -198,8 +224,8 @@ impl BlockValidation {
         }
     }
 
-    /// Squares of what a law leaves on the channels that feel it, fitted to all blocks, and how many independent samples that is
-    /// worth.
+    /// Squared residual of a law that is fitted to all blocks, on the channels on which it has an effect, relative to
+    /// the noise; and its effective number of samples.
     pub(super) fn residual_at_site(&self, samples: &LawSamples<'_>, one: &LawTrial) -> (f64, f64) {
         let site = one.site;
         let own: Vec<Vec<f64>> = (one.terms.iter())
@@ -208,8 +234,10 @@ impl BlockValidation {
         let k = samples.picked.len();
         let (mut squares, mut worth) = (0.0, 0.0);
         for (part, d) in samples.channels(site).iter().enumerate() {
+            // Base, effects and residual on this channel.
             let known = &self.columns[*d];
             let n = known.len() - 1;
+            // Subtract the known columns and the law from the residual, with the factors from all blocks.
             let mut left = known[n].clone();
             let of_law = own.iter().map(|column| &column[part * k..(part + 1) * k]);
             let all = known[..n].iter().map(Vec::as_slice).chain(of_law);
@@ -225,7 +253,7 @@ impl BlockValidation {
     }
 }
 
-/// Inner products of columns on each block, over all channels.
+/// Inner products of columns on each block, summed over all channels.
 fn block_grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatrix<f64>> {
     let n = columns.first().map_or(0, Vec::len);
     let gram = |block: &Range<usize>| {
@@ -246,7 +274,7 @@ fn block_grams(blocks: &[Range<usize>], columns: &[Vec<Vec<f64>>]) -> Vec<DMatri
     blocks.iter().map(gram).collect()
 }
 
-/// Inner product on a block of columns, of which one without numbers is zero.
+/// Inner product of two columns on a block; an empty column is zero.
 fn product_on_block(block: &Range<usize>, a: &[f64], b: &[f64]) -> f64 {
     if a.is_empty() || b.is_empty() {
         return 0.0;

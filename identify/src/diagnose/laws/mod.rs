@@ -1,14 +1,17 @@
-//! Laws that no library holds: where something comes again with the state and no candidate explains it, products of what places
-//! do and carry are held against what is left, and those that take most of it off where they were not fitted are proposed.
-//! A proposal is a hypothesis: it says what would explain the recordings, not what the machine has.
+//! Proposed laws. Where a residual is repeatable and no candidate explains it, products of the motion and load of
+//! places are compared with the residual. Those that explain most of it on data that was not fitted are proposed. A
+//! proposal is a hypothesis: it states what would explain the recordings, not what the machine has.
+//! Input: the set of effects and its residual. Output: proposals, each with laws that are nearly as good.
 //!
-//! 1. `shapes`, `features` - the grammar; `dimensions` - units of what multiplies it.
-//! 2. `ground` - thousands of products are scored by inner products beside the base parameters and the effects that were found.
-//! 3. The best of each form has its constants sought, and second terms beside it.
-//! 4. `held_out` - what each takes off in time that it was not fitted to, and which differences are within the noise of that.
+//! 1. `shapes`, `features` - the grammar; `dimensions` - units of the parameters.
+//! 2. `ground` - thousands of products are scored by inner products, with the base parameters and the effects found
+//!    projected out.
+//! 3. The best product of each form gets its constants refined, and second terms are tried in addition.
+//! 4. `held_out` - what each law explains on time that was not fitted, and which differences are within the noise of
+//!    that.
 //!
-//! Sources: S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113 (2016), for sparse regression over a library of functions;
-//! Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, Asilomar 1993, for the orthogonal search.
+//! Sources: S. L. Brunton, J. L. Proctor, J. N. Kutz, PNAS 113 (2016), for sparse regression over a library of
+//! functions; Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, Asilomar 1993, for the orthogonal search.
 
 mod dimensions;
 mod features;
@@ -21,90 +24,81 @@ use std::collections::BTreeMap;
 pub use features::{LawFactor, LawProduct, LawSite};
 pub use shapes::{LawShape, LawVariable};
 
-use super::aliases::MIN_DISTINCTION;
 use super::bench::{EffectSelector, SelectedEffect};
-use super::evidence::LEAST_GAIN;
 use super::pool::{FitScope, dot};
 use super::problem::{CandidateNature, ColumnProvider, LocatedEffect};
+use super::thresholds::{
+    LAW_HOPEFUL_PART, LAW_INDEPENDENT_COLUMNS, LAW_LEAST_NOISE_RATIO, LAW_LEAST_REPEATABLE_SHARE,
+    LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES,
+    MIN_DISTINCTION, SECOND_TERM_LEAST_T,
+};
 use features::ProductForm;
 use ground::{LawProjection, LawSamples, ScoredProduct, SiteProjection};
 use held_out::{BlockValidation, ValidatedLaw};
 
-/// A term of a law: a product, and the parameter or two that it is multiplied by.
+/// A term of a law: a product and its one or more parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawTerm {
-    /// The product.
+    /// The product of shapes.
     pub product: LawProduct,
-    /// Its parameters: one, or those of sine and cosine.
+    /// Its parameters: one, or one for sine and one for cosine. [`LawProduct::unit`] gives the unit.
     pub values: Vec<f64>,
-    /// Their standard deviations.
+    /// Their standard deviations, in the same unit.
     pub standard_deviations: Vec<f64>,
 }
 
 /// A law at a place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SiteLaw {
-    /// Where it acts, by number among the sites.
+    /// Index of the place where it acts, among the sites of the diagnosis.
     pub site: usize,
-    /// One or two.
+    /// One or two terms, which are added.
     pub terms: Vec<LawTerm>,
-    /// Share of the squares on the drives that feel it that it takes off where it was not fitted.
+    /// Share of the squared residual that it explains on data that was not fitted, on the drives on which it has an
+    /// effect, 0 to 1.
     pub gain: f64,
-    /// Effects that were found and that it makes needless.
+    /// Effects that were found and that it makes unnecessary.
     pub replaced_effects: Vec<LocatedEffect>,
 }
 
-/// What is proposed for what nobody explains, the simplest of those that do it best first.
+/// A proposal for an unexplained residual: the simplest of the best laws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LawProposal {
     /// The law.
     pub law: SiteLaw,
-    /// Laws that differ from it by no more than the noise of the ranking, the best first.
+    /// Laws that are worse by no more than the noise of the ranking, the best first.
     pub near_ties: Vec<SiteLaw>,
-    /// The channels that feel it, of those that something is left of.
+    /// Indices of the channels on which it has an effect, of those with an unexplained residual.
     pub channels: Vec<usize>,
 }
 
-/// Samples by which products are scored first, and on which the best are held out.
+/// Number of samples for scoring all products, and for validating the best ones.
 const SCREENED: usize = 1500;
 const VALIDATION_SAMPLES: usize = 8000;
-/// Forms whose constants are sought.
+/// Number of forms whose constants are refined.
 const FORMS: usize = 48;
-/// Laws of one term beside which a second is sought, and second terms of each.
+/// Number of laws of one term to which a second term is added, and of second terms for each.
 const FIRST_TERMS: usize = 6;
 const SECOND_TERMS: usize = 4;
-/// Steps by which constants are sought, as parts of what is usual: the first, and the last.
+/// First and last step of the search for constants, as shares of the range of the variable.
 const STEPS: [f64; 2] = [0.06, 0.002];
-/// A constant that gets better by less than this part has come to rest: on its way to infinity it gets better for ever.
+/// A smaller relative improvement does not count: a constant on its way to infinity would improve for ever.
 const WORTH_A_STEP: f64 = 1e-4;
-/// Rounds over all constants of a form.
+/// Largest number of rounds over all constants of a form.
 const MOST_ROUNDS: usize = 40;
-/// Squares that are left of a channel, in units of its white noise, from which on a law is sought though nothing else says that they
-/// come again.
-const SUSPICIOUS: f64 = 4.0;
-/// What a law must take off of that which comes again, and of all that is left where nothing else says that it does.
-const LEAST_PART: f64 = 0.5;
-const LEAST_ALONE: f64 = 0.6;
-/// The part of it that a term must take off with constants that are only tried, to be worth a search for better ones.
-const HOPEFUL: f64 = 0.2;
-/// How many independent columns the grammar may have, and how likely it may be that one of them does as well by chance.
-const FORMS_THERE_ARE: f64 = 1e5;
-const CHANCE: f64 = 1e-3;
-/// Deviations over the blocks by which two terms must be better than one.
-const LEAST_T: f64 = 3.0;
-/// The part of what the best takes off that is nobody's: what readings and derivatives err by is no noise.
-const SAME: f64 = 0.002;
-/// Near-ties that are told.
-const MAX_NEAR_TIES: usize = 8;
 
-/// Beside what laws are sought: a set of effects, and what it leaves.
+/// A set of effects in whose presence laws are searched, prepared for scoring and validation.
 struct LawBaseline {
+    /// The effects.
     picks: Vec<SelectedEffect>,
+    /// Projection of the set, for scores on few samples.
     ground: LawProjection,
+    /// Inner products by block, for validation on many samples.
     held_out: BlockValidation,
 }
 
 impl LawBaseline {
+    /// Fits a set of effects and prepares both; `deviations` are the standard deviations of the channels.
     fn new(
         bench: &EffectSelector<'_>,
         picks: Vec<SelectedEffect>,
@@ -121,6 +115,7 @@ impl LawBaseline {
         }
     }
 
+    /// Adds a law to the columns that are projected out and fitted; `site` is the index of its place.
     fn add_law(
         &mut self,
         few: &LawSamples<'_>,
@@ -135,35 +130,37 @@ impl LawBaseline {
     }
 }
 
-/// A law with what it leaves.
+/// A law with its validation.
 struct LawTrial {
     site: usize,
+    /// Its products, which are added.
     terms: Vec<LawProduct>,
-    /// Beside which of the bases.
+    /// Index of the baseline to which it is added.
     base: usize,
-    /// What it takes to write it down, with the effects beside it.
+    /// Length of its description, that of the effects of its baseline included.
     size: usize,
+    /// Its errors on data that was not fitted.
     validation: ValidatedLaw,
 }
 
-/// What a set of effects leaves.
+/// Residual of a set of effects, as the search for laws needs it.
 pub(crate) struct ResidualView<'a> {
-    /// `[channel][sample]`
+    /// `[channel][sample]`, N or N m.
     pub(crate) residual: &'a [Vec<f64>],
-    /// The part of each channel's squares that comes again.
+    /// Repeatable share of each channel's squares, 0 to 1.
     pub(crate) repeatable_share: &'a [f64],
-    /// Channels of which that is more than noise.
+    /// Indices of the channels whose repeatable residual is more than noise.
     pub(crate) unexplained: &'a [usize],
 }
 
 impl ResidualView<'_> {
-    /// Squares per sample of a channel.
+    /// Mean square of the residual of a channel.
     fn squares_per_sample(&self, channel: usize) -> f64 {
         let rest = &self.residual[channel];
         dot(rest, rest) / rest.len().max(1) as f64
     }
 
-    /// Part of the squares per sample of some channels, in units of the noise.
+    /// Sum over some channels of a part of the mean square, relative to the variance of the noise.
     fn squares_over_noise(
         &self,
         channels: &[usize],
@@ -176,7 +173,7 @@ impl ResidualView<'_> {
         scaled.sum()
     }
 
-    /// Of each channel what does not come again, at least its noise.
+    /// Standard deviation of the non-repeatable residual of each channel, at least that of its noise.
     fn non_repeatable_deviations(&self, noise: &[f64]) -> Vec<f64> {
         let deviation = |d: usize| {
             let own = self.squares_per_sample(d) * (1.0 - self.repeatable_share[d]);
@@ -185,19 +182,20 @@ impl ResidualView<'_> {
         (0..self.residual.len()).map(deviation).collect()
     }
 
-    /// Channels that a law may be sought for: those that are unexplained, then those that are far from white noise, since a law that
-    /// depends on few things of many may come again where no flexible function of all of them does.
+    /// Channels for which a law is searched: those that are unexplained, then those that are far above white noise. A
+    /// law of few variables may be repeatable where no flexible function of all variables is.
     fn open_channels(&self, noise: &[f64]) -> Vec<usize> {
         let is_suspicious = |d: &usize| {
             !self.unexplained.contains(d)
-                && self.squares_per_sample(*d) > SUSPICIOUS * noise[*d].powi(2)
+                && self.squares_per_sample(*d) > LAW_LEAST_NOISE_RATIO * noise[*d].powi(2)
         };
         let others = (0..self.residual.len()).filter(is_suspicious);
         self.unexplained.iter().copied().chain(others).collect()
     }
 }
 
-/// Proposes laws for what a set of effects leaves.
+/// Proposes laws for the residual of a set of effects, one after the other, until no channel is open. Returns the
+/// places and the proposals.
 pub(crate) fn propose_laws(
     bench: &EffectSelector<'_>,
     picks: &[SelectedEffect],
@@ -217,6 +215,7 @@ pub(crate) fn propose_laws(
     if sites.is_empty() {
         return (Vec::new(), Vec::new());
     }
+    // Variables along the recordings: few samples to score many products, many samples to validate the best.
     let load = bench.load(picks);
     let of_site = |site: &LawSite| site.channel.and_then(|d| load.0[d].clone());
     let loads: Vec<Option<Vec<f64>>> = sites.iter().map(of_site).collect();
@@ -225,6 +224,7 @@ pub(crate) fn propose_laws(
     let many = LawSamples::new(bench, &sites, &loads, &deviations, VALIDATION_SAMPLES);
     let base =
         |picks: Vec<SelectedEffect>| LawBaseline::new(bench, picks, &few, &many, &deviations);
+    // Laws are searched in addition to the effects found, and in place of those on the open channels.
     let mut bases = vec![base(picks.to_vec())];
     let fewer = drop_effects_on(bench, picks, &open);
     if fewer.len() < picks.len() {
@@ -233,34 +233,37 @@ pub(crate) fn propose_laws(
     let mut proposals = Vec::new();
     while let Some(channel) = open.first().copied() {
         open.retain(|d| *d != channel);
+        // Places whose forces have an effect on the channel.
         let is_felt = |site: &usize| few.channels(*site).contains(&channel);
         let felt: Vec<usize> = (0..sites.len()).filter(is_felt).collect();
         let squares = |samples: &LawSamples<'_>, site: usize, of: &dyn Fn(usize) -> f64| {
             samples.picked.len() as f64
                 * left.squares_over_noise(&samples.channels(site), &deviations, of)
         };
-        // What a law must take off of all that is left there.
+        // Least share of the residual that a law must explain on the channels of a place.
         let least = |site: usize| {
             let channels = many.channels(site);
             if channels.iter().any(|d| left.unexplained.contains(d)) {
                 let again = squares(&many, site, &|d| left.repeatable_share[d]);
-                LEAST_PART * again / squares(&many, site, &|_| 1.0)
+                LAW_LEAST_REPEATABLE_SHARE * again / squares(&many, site, &|_| 1.0)
             } else {
-                LEAST_ALONE
+                LAW_LEAST_SHARE_ALONE
             }
         };
         let is_hopeful = |one: &ScoredProduct| {
-            one.score >= HOPEFUL * least(one.site) * squares(&few, one.site, &|_| 1.0)
+            one.score >= LAW_HOPEFUL_PART * least(one.site) * squares(&few, one.site, &|_| 1.0)
         };
         let without = bases[0].held_out.validate_law(&many, 0, &[]);
         let tried = try_laws(bench, &bases, [&few, &many], &felt, &is_hopeful);
         let left_there = |one: &LawTrial| bases[one.base].held_out.residual_at_site(&many, one);
-        // Where the base, freed by a law, fits other drives better as well, that is not gained on its own drives.
+        // If base parameters improve other drives after a law is added, that does not count as a gain on its own
+        // drives.
         let gain = |one: &LawTrial| {
             let all = squares(&many, one.site, &|_| 1.0).max(f64::MIN_POSITIVE);
             let off = without.total() - one.validation.total();
             (off / all).min(1.0 - left_there(one).0 / all)
         };
+        // Squares of one independent sample: the scale for differences between laws.
         let scatter = |one: &LawTrial| {
             let (squares, worth) = left_there(one);
             squares / worth.max(1.0)
@@ -268,11 +271,11 @@ pub(crate) fn propose_laws(
         let is_one = |one: &LawTrial| {
             let channels = many.channels(one.site);
             let gain = gain(one);
-            // The best of many columns that have nothing to do with what is left explains so much of so few samples.
+            // The best of many unrelated columns explains this much of few samples by chance.
             let worth = bench.effective_equations(left.residual, &channels);
-            let by_chance = FORMS_THERE_ARE * (1.0 - gain).max(0.0).powf(0.5 * worth);
+            let by_chance = LAW_INDEPENDENT_COLUMNS * (1.0 - gain).max(0.0).powf(0.5 * worth);
             let (off, deviation) = without.excess_over(&one.validation);
-            gain >= least(one.site) && off > deviation && by_chance < CHANCE
+            gain >= least(one.site) && off > deviation && by_chance < LAW_MOST_CHANCE
         };
         let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter)
         else {
@@ -295,6 +298,7 @@ pub(crate) fn propose_laws(
             near_ties: near_ties.iter().map(law).collect(),
             channels: asked_of(&many.channels(chosen.site)),
         });
+        // The next law is searched in the presence of the chosen one.
         bases.swap(0, chosen.base);
         bases.truncate(1);
         bases[0].add_law(&few, &many, chosen.site, &chosen.terms);
@@ -303,7 +307,7 @@ pub(crate) fn propose_laws(
     (sites.into_iter().map(without_motion).collect(), proposals)
 }
 
-/// Laws beside each of the bases, formed on few samples and judged on many.
+/// Searches laws for each baseline, formed on few samples and validated on many.
 fn try_laws(
     bench: &EffectSelector<'_>,
     bases: &[LawBaseline],
@@ -331,7 +335,7 @@ fn try_laws(
     tried
 }
 
-/// A site whose motions have done their part.
+/// A place without its series, which are no longer needed.
 fn without_motion(site: LawSite) -> LawSite {
     LawSite {
         name: site.name,
@@ -341,8 +345,8 @@ fn without_motion(site: LawSite) -> LawSite {
     }
 }
 
-/// Effects without those that act where something is open: what was found may be no more than what of the law an effect of the
-/// library is like.
+/// Effects without those that act on open channels: an effect that was found there may only be the part of the law that
+/// resembles an effect of the library. Disturbances stay.
 fn drop_effects_on(
     bench: &EffectSelector<'_>,
     picks: &[SelectedEffect],
@@ -356,7 +360,7 @@ fn drop_effects_on(
     picks.iter().filter(stays).cloned().collect()
 }
 
-/// The products of a law with their parameters.
+/// The terms of a law with their estimates.
 fn law_terms(one: &LawTrial) -> Vec<LawTerm> {
     let mut parameters = one
         .validation
@@ -375,8 +379,8 @@ fn law_terms(one: &LawTrial) -> Vec<LawTerm> {
     one.terms.iter().map(term).collect()
 }
 
-/// The best laws of each form with their constants, those of one term and then those of two, as far as their first term
-/// is hopeful.
+/// The best law of each form with refined constants, as (place, products): first those of one term, then those of two
+/// whose first term is among the best.
 fn best_laws_by_form(
     ground: &LawProjection,
     samples: &LawSamples<'_>,
@@ -395,6 +399,7 @@ fn best_laws_by_form(
         .collect();
     single.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut laws: Vec<(usize, Vec<LawProduct>)> = Vec::new();
+    // Second terms are scored in the presence of the first.
     for first in single.iter().take(FIRST_TERMS) {
         let part = (ground.conditional_on_product(samples, first.site, &first.product))
             .project_at_site(samples, first.site);
@@ -408,7 +413,7 @@ fn best_laws_by_form(
     singles.chain(laws).collect()
 }
 
-/// The best of each form, the best forms first.
+/// The best product of each form, at most `most`, best first.
 fn best_of_forms(scored: impl Iterator<Item = ScoredProduct>, most: usize) -> Vec<ScoredProduct> {
     let mut best: BTreeMap<(usize, ProductForm), ScoredProduct> = BTreeMap::new();
     for one in scored {
@@ -426,7 +431,7 @@ fn best_of_forms(scored: impl Iterator<Item = ScoredProduct>, most: usize) -> Ve
     forms
 }
 
-/// The same form with the constants that take most off, found by smaller and smaller steps.
+/// The same form with better constants: pattern search with decreasing steps.
 fn refine_constants(
     part: &SiteProjection,
     samples: &LawSamples<'_>,
@@ -462,8 +467,8 @@ fn refine_constants(
     best
 }
 
-/// The simplest of the laws that leave least where they were not fitted, with those that leave no more; `None` where the best
-/// is none, as `is_one` says. What a law leaves more than the best is held against the squares of an independent sample, which
+/// The simplest of the laws with the smallest validation error, and those that are nearly equal; `None` if the best
+/// does not satisfy `is_one`. A law is nearly equal if it is worse by less than some independent samples, whose squares
 /// `scatter` gives.
 fn select_law(
     tried: Vec<LawTrial>,
@@ -472,7 +477,7 @@ fn select_law(
     is_one: &dyn Fn(&LawTrial) -> bool,
     scatter: &dyn Fn(&LawTrial) -> f64,
 ) -> Option<(LawTrial, Vec<LawTrial>)> {
-    // What the library has it was asked about already.
+    // Laws of the library have been tried as effects already.
     let is_new = |one: &LawTrial| {
         let mut terms = one.terms.iter();
         terms.any(|term| !term.is_in_library(&samples.sites[one.site]))
@@ -480,13 +485,15 @@ fn select_law(
     let all = tried.into_iter().filter(is_new);
     let (mut laws, double): (Vec<LawTrial>, Vec<LawTrial>) =
         all.partition(|one| one.terms.len() == 1);
+    // Index of the law with the smallest validation error.
     let least = |all: &[LawTrial]| -> Option<usize> {
         let totals = all.iter().map(|one| one.validation.total()).enumerate();
         totals.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     };
+    // Two terms replace one only if they are clearly better.
     if let (Some(one), Some(two)) = (least(&laws), least(&double)) {
         let (more, deviation) = laws[one].validation.excess_over(&double[two].validation);
-        if more > LEAST_T * deviation && more > LEAST_GAIN * without.total() {
+        if more > SECOND_TERM_LEAST_T * deviation && more > LEAST_GAIN * without.total() {
             laws = double;
         }
     } else if laws.is_empty() {
@@ -497,11 +504,14 @@ fn select_law(
     if !is_one(first) {
         return None;
     }
+    // Keep all laws within the noise of the best, then choose the simplest.
     let less = without.total() - first.validation.total();
-    let most = first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(SAME * less);
+    let most =
+        first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(LAW_SAME_SHARE * less);
     laws.retain(|one| one.validation.total() <= most);
     let simplest = (0..laws.len()).min_by_key(|k| laws[*k].size)?;
     let chosen = laws.remove(simplest);
+    // Of each form only the best is reported.
     let mut seen = vec![(chosen.site, product_forms(&chosen))];
     laws.retain(|one| {
         let form = (one.site, product_forms(one));
@@ -513,6 +523,7 @@ fn select_law(
     Some((chosen, laws))
 }
 
+/// Forms of the products of a law.
 fn product_forms(one: &LawTrial) -> Vec<ProductForm> {
     one.terms.iter().map(LawProduct::product_form).collect()
 }

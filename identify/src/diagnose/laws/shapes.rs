@@ -1,37 +1,37 @@
-//! Shapes: what a law may make of one variable, with constants that bend it. A variable along the recordings goes in, one or two
-//! columns of numbers come out.
+//! Shapes: functions of one variable, with constants. Input: a variable along the recordings; output: one or two
+//! columns of numbers.
 //!
-//! Sources: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994), for friction over speed and load;
-//! P. R. Dahl, AIAA Journal 14 (1976), and Y.-K. Wen, J. Eng. Mech. 102 (1976), for states that remember; L. Prandtl 1928 and
-//! A. Ishlinskii 1944 for the spring that drags a block.
+//! Sources: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994), for friction over speed and
+//! load; P. R. Dahl, AIAA Journal 14 (1976), and Y.-K. Wen, J. Eng. Mech. 102 (1976), for states that remember; L.
+//! Prandtl 1928 and A. Ishlinskii 1944 for the spring that drags a block.
 
-/// What a shape is a function of.
+/// Variable of a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LawVariable {
     /// Position of the place on which the law acts, m or rad.
     Position,
-    /// Its rate.
+    /// Its rate, m/s or rad/s.
     Rate,
-    /// Its acceleration.
+    /// Its acceleration, m/s^2 or rad/s^2.
     Acceleration,
-    /// What its drive carries, N or N m.
+    /// Load of its drive, N or N m.
     Load,
-    /// Position of another place.
+    /// Position of another place, m or rad.
     OtherPosition,
-    /// Its rate.
+    /// Rate of the other place, m/s or rad/s.
     OtherRate,
 }
 
-/// A function of one variable `z`; constants are in its unit.
+/// A function of one variable `z`. Its constants have the unit of `z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LawShape {
-    /// `|z|^(halves/2)`, with the sign of `z` if it is odd. Powers that are not whole are of `z/scale`.
+    /// `|z|^(halves/2)`, with the sign of `z` if it is odd. Powers with a fractional exponent are of `z/scale`.
     Power {
         /// Twice the exponent.
         halves: i32,
         /// Whether it has the sign of `z`.
         is_odd: bool,
-        /// What `z` is divided by where the exponent is not whole.
+        /// Divides `z` if the exponent is fractional.
         scale: f64,
     },
     /// `(z - centre)^power`
@@ -41,18 +41,18 @@ pub enum LawShape {
         /// The exponent.
         power: i32,
     },
-    /// `z - from` beyond `from` on one side, nothing before: what begins at a place, as a stop does.
+    /// `z - from` beyond `from` on one side and zero before, raised to a power: for example an end stop.
     Hinge {
         /// Where it begins.
         from: f64,
-        /// 1 where it acts above, -1 below.
+        /// 1 if it acts above, -1 if below.
         side: f64,
         /// The exponent.
         power: i32,
     },
     /// `sin(2 pi z/pitch)` and `cos(2 pi z/pitch)`
     Wave {
-        /// After which it repeats.
+        /// Period.
         pitch: f64,
     },
     /// `exp(-((z - centre)/width)^2)`
@@ -62,43 +62,43 @@ pub enum LawShape {
         /// Where it has fallen to 1/e.
         width: f64,
     },
-    /// `(z - centre)/width*exp(-((z - centre)/width)^2)`: what draws to a place that is near, as a detent does.
+    /// `(z - centre)/width*exp(-((z - centre)/width)^2)`: attraction to a nearby place, as by a detent.
     Detent {
-        /// The place.
+        /// The place of attraction.
         centre: f64,
-        /// How near.
+        /// Range of the attraction.
         width: f64,
     },
     /// `tanh((z - centre)/width)`
     Step {
         /// Where it changes its sign.
         centre: f64,
-        /// How fast.
+        /// Distance over which the sign changes.
         width: f64,
     },
-    /// `sign(z)*exp(-(|z|/scale)^(halves/2))`: what fades with speed, after R. Stribeck.
+    /// `sign(z)*exp(-(|z|/scale)^(halves/2))`: friction that decreases with speed, after R. Stribeck.
     Fading {
         /// Where it has fallen to 1/e.
         scale: f64,
         /// Twice the exponent.
         halves: i32,
     },
-    /// A state between -1 and 1 that goes to the sign of the way gone: `dz/dx = (1 - (z sign(x'))^curve ...)/length`, Dahl's with
-    /// `curve` 1, that of Bouc and Wen with 2.
+    /// A state between -1 and 1 that approaches the sign of the direction of motion: `dz/dx = (1 - (z sign(x'))^curve
+    /// ...)/length`, Dahl's model with `curve` 1, that of Bouc and Wen with 2.
     Memory {
-        /// Over which it goes there.
+        /// Travel over which it approaches the bound.
         length: f64,
-        /// How it goes there.
+        /// Exponent of the approach: 1 or 2.
         curve: i32,
     },
-    /// The stretch of a spring that drags a block, between -1 and 1.
+    /// Elongation of a spring that drags a block, between -1 and 1.
     Slip {
-        /// The largest stretch.
+        /// Travel from zero to the largest elongation.
         width: f64,
     },
 }
 
-/// The sort of a shape, whatever its constants.
+/// Kind of a shape without its constants: number of the variant, exponent, and sign or side.
 pub(crate) type LawShapeKind = (u8, i32, bool);
 
 impl LawShape {
@@ -109,7 +109,7 @@ impl LawShape {
     /// `|z|`
     pub const MAGNITUDE: Self = Self::integer_power(1, false);
 
-    /// A whole power of `z`, with its sign if `is_odd`.
+    /// An integer power of `z`, with its sign if `is_odd`.
     pub const fn integer_power(power: i32, is_odd: bool) -> Self {
         Self::Power {
             halves: 2 * power,
@@ -118,7 +118,7 @@ impl LawShape {
         }
     }
 
-    /// What shapes have in common that differ in their constants alone.
+    /// Its kind, equal for shapes that differ in their constants only.
     pub(crate) fn shape_kind(self) -> LawShapeKind {
         match self {
             Self::Power { halves, is_odd, .. } => (0, halves, is_odd),
@@ -134,12 +134,12 @@ impl LawShape {
         }
     }
 
-    /// Whether it depends on the way there, so that no formula of the present state says it.
+    /// Whether it depends on the past motion, so that no formula of the present state describes it.
     pub fn has_memory(self) -> bool {
         matches!(self, Self::Memory { .. } | Self::Slip { .. })
     }
 
-    /// Power of the variable's unit that it has.
+    /// Power of the variable's unit in its values.
     pub(crate) fn unit_exponent(self) -> i32 {
         match self {
             Self::Power { halves, .. } if halves % 2 == 0 => halves / 2,
@@ -148,7 +148,7 @@ impl LawShape {
         }
     }
 
-    /// Numbers that bend it and are sought.
+    /// Number of its constants that are searched.
     pub(crate) fn freedoms(self) -> usize {
         match self {
             Self::Power { .. } => 0,
@@ -158,7 +158,7 @@ impl LawShape {
         }
     }
 
-    /// Its columns along a variable, whose samples follow each other in stretches that begin at `starts`.
+    /// Its columns along a variable; segments of samples begin at `starts`.
     pub(crate) fn values(self, z: &[f64], starts: &[usize]) -> Vec<Vec<f64>> {
         let each = |of: &dyn Fn(f64) -> f64| vec![z.iter().map(|z| of(*z)).collect()];
         match self {
@@ -213,8 +213,8 @@ impl LawShape {
         }
     }
 
-    /// The same shape with a constant moved, by parts of what is usual for a variable that goes from `low` to `high`. There are
-    /// [`Self::freedoms`] constants.
+    /// The same shape with one of its [`Self::freedoms`] constants changed, by a share `step` of what is usual for a
+    /// variable between `low` and `high`.
     pub(crate) fn with_moved_constant(
         self,
         which: usize,
@@ -223,7 +223,7 @@ impl LawShape {
     ) -> Self {
         let travel = high - low;
         let along = |x: f64| x + step * travel;
-        // What is wider than all of the range is another shape.
+        // A shape that is wider than the range is another shape.
         let widest = travel.max(high.abs()).max(low.abs());
         let times = |x: f64| (x * (4.0 * step).exp()).min(widest);
         match (self, which) {
@@ -280,12 +280,13 @@ impl LawShape {
     }
 }
 
-/// The sign, zero of zero.
+/// The sign of a number; 0 for 0.
 fn sign(z: f64) -> f64 {
     if z == 0.0 { 0.0 } else { z.signum() }
 }
 
-/// Steps of a state along a position; it begins anew with each stretch.
+/// Integrates a state along a position. `next` gets the state and the change of position; the state starts at zero in
+/// each segment.
 fn integrate_along(z: &[f64], starts: &[usize], mut next: impl FnMut(f64, f64) -> f64) -> Vec<f64> {
     let mut state = 0.0;
     let mut begins = starts.iter().copied().peekable();
@@ -302,17 +303,17 @@ fn integrate_along(z: &[f64], starts: &[usize], mut next: impl FnMut(f64, f64) -
     z.iter().enumerate().map(step).collect()
 }
 
-/// `dz/dx = (sign(x') - z)/length`, or `(1 - z^2 sign(z x')...)` in the form of Bouc and Wen: while it is driven back it goes
-/// twice as fast as a spring alone, so that loops close.
+/// `dz/dx = (sign(x') - z)/length`, or `(1 - z^2 sign(z x')...)` in the form of Bouc and Wen. In the second form it
+/// returns faster after a reversal than it approached, so that loops close.
 fn hysteresis_state(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec<f64> {
     integrate_along(z, starts, |state, moved| {
         let way = sign(moved);
         let gone = moved.abs() / length;
         if curve == 1 {
-            // Exact for a straight way between samples.
+            // Exact for a linear motion between samples.
             way + (state - way) * (-gone).exp()
         } else {
-            // z' = 1 - z|z| along the way; by steps that a straight way may have.
+            // z' = 1 - z|z| in the direction of motion, integrated in up to 40 steps.
             let mut own = way * state;
             let parts = (4.0 * gone).ceil().clamp(1.0, 40.0);
             let mut left = parts;
@@ -325,6 +326,7 @@ fn hysteresis_state(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec
     })
 }
 
+/// Elongation of a spring that drags a block, relative to its largest elongation.
 fn dragged_spring(z: &[f64], starts: &[usize], width: f64) -> Vec<f64> {
     integrate_along(z, starts, |state, moved| {
         (state + moved / width).clamp(-1.0, 1.0)

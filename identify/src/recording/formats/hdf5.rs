@@ -1,8 +1,8 @@
-//! Recordings as HDF5 files, MATLAB's format 7.3 (`save -v7.3`) among them: datasets of numbers become columns.
+//! Recordings as HDF5 files, including MATLAB's format 7.3 (`save -v7.3`): datasets of numbers become columns.
 //!
-//! A vector `q1` in the group `run` is the column `run.q1`; the columns of a matrix `q` are `q_1`, `q_2` and so on, and the
-//! fields of records `log.position`. All must have the same number of samples; what has another length is left aside and
-//! said.
+//! A vector `q1` in the group `run` is the column `run.q1`. The columns of a matrix `q` are `q_1`, `q_2` and so on,
+//! and the fields of records are `log.position`. All must have the same number of samples. Datasets of another length
+//! are skipped and listed in a note.
 
 use std::io::Cursor;
 
@@ -20,19 +20,20 @@ use crate::recording::tables::{ColumnInfo, find_time_range};
 use crate::recording::{ReadOptions, SignalRecording};
 use crate::words::backquoted_list;
 
-/// More datasets than any recording has.
+/// Largest number of datasets; more are an error of the file.
 const MOST_DATASETS: usize = 1 << 14;
+/// Largest number of columns.
 const MOST_COLUMNS: usize = 1 << 17;
-/// Groups within one another.
+/// Deepest nesting of groups.
 const DEEPEST: usize = 16;
-/// Bytes of a dataset that are in memory at once, besides a chunk.
+/// Bytes of a dataset that are in memory at once, in addition to a chunk.
 const WINDOW: u64 = 8 << 20;
-/// The largest chunk; writers make some of a megabyte.
+/// Largest chunk in bytes; writers usually make chunks of about a megabyte.
 const LARGEST_CHUNK: u64 = 64 << 20;
-/// Groups in which MATLAB keeps what is none of the user's.
+/// Groups of MATLAB with internal data.
 const MATLAB_GROUPS: [&str; 2] = ["#refs#", "#subsystem#"];
 
-/// HDF5, whoever wrote it.
+/// The HDF5 format of any writer.
 pub(crate) struct Hdf5Format;
 
 impl RecordingFormat for Hdf5Format {
@@ -44,6 +45,7 @@ impl RecordingFormat for Hdf5Format {
         &["h5", "hdf5", "hdf"]
     }
 
+    // MATLAB puts a text header in front of the signature of HDF5.
     fn has_signature(&self, first: &[u8]) -> bool {
         first.starts_with(b"MATLAB 7.3 MAT-file") || first.starts_with(b"\x89HDF")
     }
@@ -68,9 +70,10 @@ impl RecordingFormat for Hdf5Format {
             name: column.name.clone(),
             kind: column.number.name(),
         });
+        // Skipped datasets are listed in the remark.
         let remark = (!columns.others.is_empty()).then(|| {
             format!(
-                "left aside, of another length or no numbers: {}",
+                "skipped, of another length or without numbers: {}",
                 backquoted_list(&columns.others)
             )
         });
@@ -87,8 +90,10 @@ impl RecordingFormat for Hdf5Format {
     }
 }
 
+/// Opens a file; streams are read into memory first.
 fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
     let opened = match input {
+        // A file on disk is read in parts as needed.
         RecordingInput::File(stream) => ReadSeekSource::new(stream)
             .map_err(Error::from)
             .and_then(File::from_source),
@@ -100,6 +105,7 @@ fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
     opened.map_err(|error| unreadable_fault(&error))
 }
 
+/// Reads the columns that are needed.
 fn read(
     opened: &File,
     file: &str,
@@ -107,9 +113,10 @@ fn read(
 ) -> Result<SignalRecording, RecordingFault> {
     let columns = HdfColumns::new(opened)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
+    // Datasets that are no columns are reported.
     if !columns.others.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "{} of {file} {} not of as many samples as the others, or no numbers, and left aside.",
+            "{} of {file} {} skipped, because of another number of samples or without numbers.",
             backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
@@ -120,16 +127,18 @@ fn read(
     }
     let is_read = |place: &usize| intake.is_place_needed(*place);
     let read: Vec<usize> = (0..columns.consistent.len()).filter(is_read).collect();
-    // Numbers are kept twice until all are taken in.
+    // The numbers exist twice until all samples are taken.
     if read.len().saturating_mul(columns.samples) > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, which can be read in parts",
         ));
     }
+    // The numbers of each needed column; the others stay empty.
     let mut values = vec![Vec::new(); columns.consistent.len()];
     for place in read {
         values[place] = columns.consistent[place].read_numbers(opened, columns.samples)?;
     }
+    // Pass the samples to the intake, one row after another.
     let mut sample = vec![SampleField::Number(0.0); columns.consistent.len()];
     for k in 0..columns.samples {
         for (field, values) in sample.iter_mut().zip(&values) {
@@ -137,6 +146,7 @@ fn read(
                 *field = SampleField::finite(*value);
             }
         }
+        // The only bad fields here are not finite, because all numbers have been converted.
         let text = |_: usize| "NaN or infinite".to_owned();
         if intake.take_sample(k as u64 + 1, &sample, &text)? == IntakeFlow::Stop {
             break;
@@ -145,36 +155,44 @@ fn read(
     intake.finish(file)
 }
 
-/// The columns of a file, all of one length, and the names of what is none.
+/// The columns of a file, all of the same length, and the names of the datasets that are skipped.
 struct HdfColumns {
+    /// Number of samples.
     samples: usize,
+    /// Columns with that number of samples.
     consistent: Vec<HdfColumn>,
+    /// Names of datasets of another length or without numbers.
     others: Vec<String>,
 }
 
-/// A column, and where its numbers stand.
+/// A column and the position of its numbers.
 struct HdfColumn {
+    /// Name of the column: its path with points, with a number and a field if there are several.
     name: String,
+    /// Path of its dataset in the file.
     path: String,
-    /// Elements of a row of the dataset, and which of them is this column; or else the row that it is.
+    /// The elements of the dataset that belong to the column.
     place: HdfColumnPlace,
+    /// Position and type of the number within an element.
     number: HdfNumber,
 }
 
+/// Which elements of a dataset belong to a column.
 #[derive(Clone, Copy)]
 enum HdfColumnPlace {
-    /// Samples are rows of so many elements, and the column is one of them.
+    /// Samples are rows of `of` elements, and the column is element `k` of each.
     Element { of: u64, k: u64 },
-    /// The column is a row.
+    /// The column is one row of the dataset.
     Row(u64),
 }
 
 impl HdfColumns {
+    /// Sorts the datasets of a file into columns and others.
     fn new(file: &File) -> Result<Self, RecordingFault> {
         let mut found = Vec::new();
         let mut others = Vec::new();
         collect_datasets(&file.root(), "", 0, &mut found, &mut others)?;
-        // The number of samples is the longest side that any dataset has.
+        // The number of samples is the longest side of any dataset.
         let samples = found
             .iter()
             .flat_map(|one| &one.shape)
@@ -182,14 +200,15 @@ impl HdfColumns {
             .max()
             .unwrap_or(0);
         if samples == 0 {
-            return Err(format_fault("it holds no datasets of numbers"));
+            return Err(format_fault("it contains no datasets of numbers"));
         }
         let mut columns = Self {
             samples: usize::try_from(samples)
-                .map_err(|_| format_fault("it says to have more samples than any memory holds"))?,
+                .map_err(|_| format_fault("it declares more samples than fit into memory"))?,
             consistent: Vec::new(),
             others,
         };
+        // Vectors and matrices can be columns; a vector is a matrix with one column.
         for one in found {
             let (rows, width) = match one.shape.as_slice() {
                 [rows] => (*rows, 1),
@@ -200,14 +219,17 @@ impl HdfColumns {
                 columns.others.push(one.name);
                 continue;
             }
+            // Samples are the rows of an upright matrix, otherwise its columns.
             let is_upright = rows == samples;
             let n = if is_upright { width } else { rows };
             if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64
             {
                 return Err(format_fault("it has more columns than any recording"));
             }
+            // Each column of the matrix has one column for each number of its elements.
             for k in 0..n {
                 for (field, number) in &one.numbers {
+                    // A dataset with a single column needs no number in the name.
                     let number_of = if n == 1 {
                         String::new()
                     } else {
@@ -229,6 +251,7 @@ impl HdfColumns {
         Ok(columns)
     }
 
+    /// Names of the columns, in the order of the file.
     fn names(&self) -> Vec<String> {
         self.consistent
             .iter()
@@ -239,15 +262,20 @@ impl HdfColumns {
 
 /// A dataset of numbers.
 struct HdfDataset {
-    /// Its path with points.
+    /// Its path, with points instead of slashes.
     name: String,
+    /// Its path in the file.
     path: String,
+    /// Its sides; their number is one for a vector.
     shape: Vec<u64>,
-    /// The numbers of an element: one without a name, or the fields of a record.
+    /// The numbers of an element: one without a name, or one for each field of a record.
     numbers: Vec<(String, HdfNumber)>,
 }
 
-/// Collects the datasets of a group and of those within it.
+/// Collects the datasets of a group and of all groups in it.
+///
+/// Datasets without numbers go to `others` by name. Fails when groups are nested without end, or a chunk is too
+/// large.
 fn collect_datasets(
     group: &Group,
     path: &str,
@@ -258,16 +286,19 @@ fn collect_datasets(
     if depth > DEEPEST || found.len() + others.len() > MOST_DATASETS {
         return Err(format_fault("its groups have no end"));
     }
+    // First the datasets of this group.
     for dataset in group.datasets().map_err(|error| unreadable_fault(&error))? {
         let path = format!("{path}/{dataset}");
         let name = path[1..].replace('/', ".");
         let dataset = group
             .dataset(&dataset)
             .map_err(|error| unreadable_fault(&error))?;
+        // A type that the library does not know is skipped.
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else {
             others.push(name);
             continue;
         };
+        // The numbers within an element, with the names of their fields.
         let mut numbers = Vec::new();
         HdfNumber::collect_numbers(
             &kind,
@@ -280,6 +311,7 @@ fn collect_datasets(
             others.push(name);
             continue;
         }
+        // The library reads complete chunks, so their size is limited.
         let chunk = dataset
             .chunk_shape()
             .map_err(|error| unreadable_fault(&error))?;
@@ -301,6 +333,7 @@ fn collect_datasets(
             numbers,
         });
     }
+    // Then the groups in this group.
     for inner in group.groups().map_err(|error| unreadable_fault(&error))? {
         if MATLAB_GROUPS.contains(&inner.as_str()) {
             continue;
@@ -320,17 +353,22 @@ fn collect_datasets(
 }
 
 impl HdfColumn {
-    /// Its numbers, read in windows that fit into memory.
+    /// Its numbers, one per sample, read in parts of at most [`WINDOW`] bytes.
+    ///
+    /// Fails when the dataset is shorter than its declared size.
     fn read_numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, RecordingFault> {
         let dataset = file
             .dataset(&self.path)
             .map_err(|error| unreadable_fault(&error))?;
         let mut values = Vec::new();
+        // Bytes of an element of the dataset.
         let size = usize::try_from(self.number.element).unwrap_or(usize::MAX);
+        // Appends every `every`-th element from `from` on.
         let mut take = |bytes: &[u8], every: usize, from: usize| {
             let elements = bytes.chunks_exact(size).skip(from).step_by(every);
             values.extend(elements.map(|element| self.number.value(element)));
         };
+        // A row is read at once; a column is read in groups of rows.
         match self.place {
             HdfColumnPlace::Row(k) => {
                 let bytes = dataset
@@ -338,6 +376,7 @@ impl HdfColumn {
                     .map_err(|error| unreadable_fault(&error))?;
                 take(&bytes, 1, 0);
             }
+            // Bytes of a row, and the number of rows per part.
             HdfColumnPlace::Element { of, k } => {
                 let row = of.saturating_mul(self.number.element).max(1);
                 let most = (WINDOW / row).max(1);
@@ -353,9 +392,10 @@ impl HdfColumn {
                 }
             }
         }
+        // A truncated file gives fewer numbers than declared.
         if values.len() != samples {
             return Err(format_fault(format!(
-                "`{}` is shorter than it says",
+                "`{}` is shorter than its declared size",
                 self.name
             )));
         }
@@ -363,26 +403,36 @@ impl HdfColumn {
     }
 }
 
-/// A number within an element of a dataset.
+/// The position and type of a number within an element of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HdfNumber {
-    /// Bytes of an element, and where the number begins in it.
+    /// Bytes of an element.
     element: u64,
+    /// Position of the number in the element, in bytes.
     at: usize,
+    /// Bytes of the number.
     size: usize,
+    /// Whether the first byte is the highest one.
     is_big: bool,
+    /// How the bytes are interpreted.
     kind: HdfNumberKind,
 }
 
+/// How the bytes of a number are interpreted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum HdfNumberKind {
+    /// Integer with a sign, in two's complement.
     Signed,
+    /// Integer without a sign.
     Unsigned,
+    /// IEEE 754 float of 4 or 8 bytes.
     Float,
 }
 
 impl HdfNumber {
-    /// Finds the numbers of a type, each with the name that it adds to that of the dataset.
+    /// Collects the numbers of a type, each with the suffix that it adds to the name of the dataset.
+    ///
+    /// `at` is the position of the type in an element of `element` bytes. Other types are ignored.
     fn collect_numbers(
         kind: &Datatype,
         name: String,
@@ -392,6 +442,7 @@ impl HdfNumber {
     ) {
         let size = kind.type_size();
         let (order, kind) = match kind {
+            // Integers that fill their bytes.
             Datatype::FixedPoint {
                 byte_order,
                 layout:
@@ -409,6 +460,7 @@ impl HdfNumber {
                 };
                 (*byte_order, kind)
             }
+            // IEEE floats; other layouts are not supported.
             Datatype::FloatingPoint {
                 byte_order, layout, ..
             } if *layout == FloatingPointLayout::IEEE754_BINARY32
@@ -416,10 +468,11 @@ impl HdfNumber {
             {
                 (*byte_order, HdfNumberKind::Float)
             }
-            // Truths of h5py are words for 0 and 1.
+            // Booleans of h5py are enumerations of 0 and 1.
             Datatype::Enumeration { base_type, .. } => {
                 return Self::collect_numbers(base_type, name, at, element, numbers);
             }
+            // The fields of a record.
             Datatype::Compound { members, .. } => {
                 for member in members {
                     let name = format!("{name}.{}", member.name);
@@ -428,6 +481,7 @@ impl HdfNumber {
                 }
                 return;
             }
+            // The elements of an array, numbered from 1.
             Datatype::Array {
                 base_type,
                 dimensions,
@@ -449,6 +503,7 @@ impl HdfNumber {
             }
             _ => return,
         };
+        // A number must lie within its element.
         if order == DatatypeByteOrder::Vax || at + u64::from(size) > element {
             return;
         }
@@ -462,8 +517,9 @@ impl HdfNumber {
         numbers.push((name, number));
     }
 
-    /// Its value in an element.
+    /// Its value in the bytes of an element.
     fn value(self, element: &[u8]) -> f64 {
+        // The bytes in little-endian order, padded with zeros.
         let mut bytes = [0; 8];
         let stored = &element[self.at..self.at + self.size];
         for (k, byte) in bytes.iter_mut().zip(0..self.size) {
@@ -473,6 +529,7 @@ impl HdfNumber {
                 byte
             }];
         }
+        // Shifting left and back extends the sign.
         let bits = u64::from_le_bytes(bytes);
         let above = 64 - 8 * self.size;
         match (self.kind, self.size) {
@@ -486,6 +543,7 @@ impl HdfNumber {
         }
     }
 
+    /// The name of its type, such as `float64`.
     fn name(self) -> String {
         let kind = match self.kind {
             HdfNumberKind::Signed => "int",
@@ -496,6 +554,7 @@ impl HdfNumber {
     }
 }
 
+/// The fault of a file with other contents.
 fn format_fault(says: impl Into<String>) -> RecordingFault {
     RecordingFault::Format {
         format: "an HDF5 or MATLAB 7.3 file",
@@ -503,8 +562,9 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
     }
 }
 
+/// The fault of a file that cannot be read.
 fn unreadable_fault(error: &Error) -> RecordingFault {
     format_fault(format!(
-        "it cannot be read: {error}; is it complete, and closed by whoever wrote it?"
+        "it cannot be read: {error}; is it complete, and was it closed by the program that wrote it?"
     ))
 }

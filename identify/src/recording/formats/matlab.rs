@@ -1,8 +1,8 @@
 //! Recordings as MATLAB files of format 5 (`save -v7` and before): vectors and matrices of numbers become columns.
 //!
 //! A vector `q1` is the column `q1`; the columns of a matrix `q` are `q_1`, `q_2` and so on. All must have the same
-//! number of samples; what has another length, and what is no numeric array, is left aside and said. Columns of complex
-//! numbers are listed, and refused where they are asked for.
+//! number of samples. Arrays of another length and other variables are skipped and listed in a note. Columns of
+//! complex numbers are listed, but refused when they are used.
 
 use std::io::{BufReader, Read, Seek};
 
@@ -16,10 +16,10 @@ use crate::recording::tables::{ColumnInfo, find_time_range};
 use crate::recording::{ReadOptions, SignalRecording};
 use crate::words::backquoted_list;
 
-/// More columns than any recording has.
+/// Largest number of columns; more are an error of the file.
 const MOST_COLUMNS: usize = 1 << 17;
 
-/// What `save -v7` and `-v6` write.
+/// The format of `save -v7` and `-v6`.
 pub(crate) struct Matlab5Format;
 
 impl RecordingFormat for Matlab5Format {
@@ -31,6 +31,7 @@ impl RecordingFormat for Matlab5Format {
         &["mat"]
     }
 
+    // The text at the start of the header states the version.
     fn has_signature(&self, first: &[u8]) -> bool {
         first.starts_with(b"MATLAB 5.0 MAT-file")
     }
@@ -49,6 +50,7 @@ impl RecordingFormat for Matlab5Format {
     }
 
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
+        // The stream is read twice: for the arrays, and for the time range.
         let mut stream = input.seekable()?;
         let columns = MatlabColumns::new(&open(&mut stream)?)?;
         let info = |column: &MatlabColumn| ColumnInfo {
@@ -65,12 +67,13 @@ impl RecordingFormat for Matlab5Format {
             columns: columns.consistent.iter().map(info).collect(),
             samples: columns.samples,
             time: find_time_range(&columns.names(), |name| {
+                // Reading starts at the beginning of the stream.
                 stream.rewind().ok()?;
                 read(&mut stream, "", &ReadOptions::single_column(name)).ok()
             }),
             remark: (!columns.others.is_empty()).then(|| {
                 format!(
-                    "left aside, of another length: {}",
+                    "skipped, of another length: {}",
                     backquoted_list(&columns.others)
                 )
             }),
@@ -78,6 +81,7 @@ impl RecordingFormat for Matlab5Format {
     }
 }
 
+/// Reads the columns that are needed.
 fn read(
     stream: impl Read + Seek,
     file: &str,
@@ -86,9 +90,10 @@ fn read(
     let mut arrays = open(stream)?;
     let columns = MatlabColumns::new(&arrays)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
+    // Variables that are no columns are reported.
     if !columns.others.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "{} of {file} {} not of as many samples as the others, and left aside.",
+            "{} of {file} {} skipped, because of another number of samples.",
             backquoted_list(&columns.others),
             if columns.others.len() == 1 {
                 "is"
@@ -97,11 +102,12 @@ fn read(
             },
         )));
     }
+    // Only arrays with a needed column are read.
     let mut wanted = vec![false; arrays.arrays.len()];
     for (place, column) in columns.consistent.iter().enumerate() {
         wanted[column.array] |= intake.is_place_needed(place) && !column.is_complex;
     }
-    // An array is read as a whole, and its numbers are kept twice until all are taken in.
+    // An array is read completely, and its numbers exist twice until all samples are taken.
     let sizes = arrays
         .arrays
         .iter()
@@ -112,9 +118,10 @@ fn read(
         .sum();
     if numbers > options.max_numbers / 2 {
         return Err(format_fault(
-            "it is too large to be read as a whole; save it as CSV or Parquet, of which parts can be read",
+            "it is too large to be read completely; save it as CSV or Parquet, which can be read in parts",
         ));
     }
+    // The numbers of each needed array; the others stay empty.
     let mut values = Vec::new();
     for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
         values.push(if wanted {
@@ -125,6 +132,7 @@ fn read(
             Vec::new()
         });
     }
+    // Value of a column at a sample; zero for columns that are not read.
     let value = |place: usize, k: usize| {
         let column = &columns.consistent[place];
         let numbers = &values[column.array];
@@ -133,6 +141,7 @@ fn read(
             .copied()
             .unwrap_or(0.0)
     };
+    // Pass the samples to the intake, one row after another.
     let mut sample = Vec::new();
     for k in 0..columns.samples {
         sample.clear();
@@ -143,6 +152,7 @@ fn read(
                 SampleField::finite(value(place, k))
             }
         }));
+        // The text of a field for messages.
         let text = |place: usize| {
             if columns.consistent[place].is_complex {
                 "a complex number".to_owned()
@@ -157,34 +167,44 @@ fn read(
     intake.finish(file)
 }
 
+/// Opens a file and reads the list of its arrays.
 fn open<R: Read + Seek>(stream: R) -> Result<MatlabArrayFile<BufReader<R>>, RecordingFault> {
     MatlabArrayFile::new(BufReader::new(stream)).map_err(|error| unreadable_fault(&error))
 }
 
-/// The columns of a file, all of one length, and the names of what is none.
+/// The columns of a file, all of the same length, and the names of the arrays that are skipped.
 struct MatlabColumns {
+    /// Number of samples.
     samples: usize,
+    /// Columns with that number of samples.
     consistent: Vec<MatlabColumn>,
+    /// Names of arrays of another length.
     others: Vec<String>,
 }
 
-/// A column, and where its numbers stand: from `first` on, `step` apart.
+/// A column and the positions of its numbers: the first one, then `step` apart.
 struct MatlabColumn {
+    /// Name of the array, with a number if it has several columns.
     name: String,
+    /// Index of its array in the file.
     array: usize,
+    /// Position of the first number in the array, column by column.
     first: usize,
+    /// Distance of its numbers in the array.
     step: usize,
+    /// Whether the array has imaginary parts.
     is_complex: bool,
 }
 
 impl MatlabColumns {
+    /// Sorts the arrays into columns and others.
     fn new<R>(file: &MatlabArrayFile<R>) -> Result<Self, RecordingFault> {
-        // The number of samples is the longest side that any array has.
+        // The number of samples is the longest side of any array.
         let sides = file.arrays.iter().flat_map(|array| &array.size);
         let samples = sides.copied().max().unwrap_or(0);
         if samples == 0 {
             return Err(format_fault(
-                "it holds no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
+                "it contains no numeric arrays at its top level; structures and tables cannot be read: save their fields as \
                  variables of their own, or as CSV or Parquet",
             ));
         }
@@ -193,6 +213,7 @@ impl MatlabColumns {
             consistent: Vec::new(),
             others: Vec::new(),
         };
+        // Only matrices can be columns; arrays with more sides are skipped.
         for (i, array) in file.arrays.iter().enumerate() {
             let (rows, cols) = match array.size.as_slice() {
                 [rows, cols] if array.is_consistent => (*rows, *cols),
@@ -202,11 +223,13 @@ impl MatlabColumns {
                 columns.others.push(array.name.clone());
                 continue;
             }
+            // Samples are the rows of an upright matrix, otherwise its columns.
             let is_upright = rows == samples;
             let width = if is_upright { cols } else { rows };
             if columns.consistent.len() + width > MOST_COLUMNS {
                 return Err(format_fault("it has more columns than any recording"));
             }
+            // MATLAB stores matrices column by column, so the step within a row is the number of rows.
             for j in 0..width {
                 columns.consistent.push(MatlabColumn {
                     name: if width == 1 {
@@ -224,6 +247,7 @@ impl MatlabColumns {
         Ok(columns)
     }
 
+    /// Names of the columns, in the order of the file.
     fn names(&self) -> Vec<String> {
         self.consistent
             .iter()
@@ -232,6 +256,7 @@ impl MatlabColumns {
     }
 }
 
+/// The fault of a file with other contents.
 fn format_fault(says: impl Into<String>) -> RecordingFault {
     RecordingFault::Format {
         format: "a MATLAB file",
@@ -239,6 +264,7 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
     }
 }
 
+/// The fault of a file that cannot be read.
 fn unreadable_fault(error: &std::io::Error) -> RecordingFault {
     format_fault(format!(
         "it cannot be read: {error}; save it again with `-v7`"

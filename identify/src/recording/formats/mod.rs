@@ -1,17 +1,26 @@
-//! The formats of recordings: one list, and a reader for each that hands samples to the intake.
+//! The formats of recordings: one list, and for each a reader that passes samples to the intake.
 //!
-//! To add one, write its [`Format`] in a file of its own and put it into [`FORMATS`].
+//! To add one, implement [`RecordingFormat`] in a file of its own and add it to [`FORMATS`].
 
+#[cfg(feature = "logs")]
 mod bag;
 mod csv;
+#[cfg(not(all(feature = "parquet", feature = "hdf5", feature = "logs")))]
+mod disabled;
+#[cfg(feature = "hdf5")]
 mod hdf5;
 mod matlab;
 mod matlab_arrays;
+#[cfg(feature = "logs")]
 mod mcap;
 mod packing;
+#[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "parquet")]
 mod parquet_pages;
+#[cfg(feature = "logs")]
 mod rosbag;
+#[cfg(feature = "logs")]
 mod sqlite;
 
 use std::fs::File;
@@ -21,47 +30,60 @@ use crate::recording::error::RecordingFault;
 use crate::recording::tables::TableInfo;
 use crate::recording::{ReadOptions, SignalRecording};
 
-/// All formats, in the order in which they are asked whether a file is theirs; text comes last and takes what is left.
+/// All formats, in the order in which their signatures are compared. Text is last and accepts everything.
 pub(crate) const FORMATS: [&dyn RecordingFormat; 8] = [
+    #[cfg(feature = "parquet")]
     &parquet::ParquetFormat,
+    #[cfg(not(feature = "parquet"))]
+    &disabled::PARQUET,
     &matlab::Matlab5Format,
+    #[cfg(feature = "hdf5")]
     &hdf5::Hdf5Format,
+    #[cfg(not(feature = "hdf5"))]
+    &disabled::HDF5,
+    #[cfg(feature = "logs")]
     &mcap::McapFormat,
+    #[cfg(not(feature = "logs"))]
+    &disabled::MCAP,
+    #[cfg(feature = "logs")]
     &rosbag::Rosbag2Format,
+    #[cfg(not(feature = "logs"))]
+    &disabled::ROSBAG2,
     &packing::CompressedFormat(packing::CompressionMethod::Gzip),
     &packing::CompressedFormat(packing::CompressionMethod::Zstd),
     &csv::CsvFormat,
 ];
 
-/// As many bytes from the beginning of a file as tell its format.
+/// Number of bytes at the start of a file that identify its format.
 pub(crate) const SIGNATURE_BYTES: usize = 32;
 
-/// How files of one kind are known and read.
+/// A format of files: how it is recognised and read.
 pub(crate) trait RecordingFormat: Sync {
-    /// What follows the name of a recording that came without a file, so that one sees what it is taken for.
+    /// Suffix of the name of a recording without a file, which states the format in messages.
     fn suffix(&self) -> &'static str {
         ""
     }
 
-    /// Endings of the names of such files.
+    /// Usual extensions of such files, without the point.
     fn extensions(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// Whether samples are rows of a table rather than lines of a text.
+    /// Whether samples are rows of a table; otherwise they are lines of text.
     fn is_table(&self) -> bool {
         true
     }
 
-    /// Whether a file of another format is in it.
+    /// Whether the contents are a file of another format.
     fn is_compressed(&self) -> bool {
         false
     }
 
-    /// Whether a file that begins with these bytes, [`TELLING_BYTES`] of them if it has as many, is of this kind.
+    /// Whether a file that begins with these bytes has this format. There are [`SIGNATURE_BYTES`] of them, or fewer
+    /// if the file is shorter.
     fn has_signature(&self, first: &[u8]) -> bool;
 
-    /// Reads a recording; `file` is what messages call it.
+    /// Reads a recording; `file` is its name in messages.
     fn read(
         &self,
         input: RecordingInput<'_>,
@@ -69,14 +91,14 @@ pub(crate) trait RecordingFormat: Sync {
         options: &ReadOptions,
     ) -> Result<SignalRecording, RecordingFault>;
 
-    /// Names of the columns as the file has them.
+    /// Names of the columns as in the file.
     fn names(&self, input: RecordingInput<'_>) -> Result<Vec<String>, RecordingFault>;
 
-    /// What it holds, table by table.
+    /// The tables or topics of the file.
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault>;
 }
 
-/// The format of what begins with these bytes.
+/// The format of a file that begins with these bytes.
 pub(crate) fn format_of(first: &[u8]) -> &'static dyn RecordingFormat {
     FORMATS
         .into_iter()
@@ -84,23 +106,23 @@ pub(crate) fn format_of(first: &[u8]) -> &'static dyn RecordingFormat {
         .unwrap_or(&csv::CsvFormat)
 }
 
-/// Where a format reads from.
+/// The source that a format reads from.
 pub(crate) enum RecordingInput<'a> {
-    /// A file, at its beginning.
+    /// A file, positioned at its start.
     File(File),
-    /// What is in memory.
+    /// Bytes in memory.
     Bytes(&'a [u8]),
-    /// What can be looked at once only, such as a pipe.
+    /// A stream that can be read only once, such as a pipe.
     Stream(Box<dyn Read + 'a>),
 }
 
-/// A stream that can be looked at anywhere.
+/// A stream with random access.
 pub(crate) trait ReadSeek: Read + Seek {}
 
 impl<T: Read + Seek> ReadSeek for T {}
 
 impl<'a> RecordingInput<'a> {
-    /// For those who read from the beginning to the end.
+    /// The source as a stream from start to end.
     pub(crate) fn stream(self) -> Box<dyn Read + 'a> {
         match self {
             Self::File(file) => Box::new(file),
@@ -109,7 +131,7 @@ impl<'a> RecordingInput<'a> {
         }
     }
 
-    /// For those who go to and fro; what can be looked at once only is taken into memory.
+    /// The source with random access; a stream is read into memory.
     pub(crate) fn seekable(self) -> Result<Box<dyn ReadSeek + 'a>, RecordingFault> {
         Ok(match self {
             Self::File(file) => Box::new(file),
@@ -119,18 +141,19 @@ impl<'a> RecordingInput<'a> {
     }
 }
 
-/// The most bytes that are kept of what can be looked at once only.
+/// Most bytes of a stream that are kept in memory.
 pub(crate) const LONGEST_STREAM: u64 = 3 << 27;
 
-/// All bytes of a stream, which must have an end.
+/// All bytes of a stream. Fails when there are more than [`LONGEST_STREAM`].
 pub(crate) fn read_all(stream: impl Read) -> Result<Vec<u8>, RecordingFault> {
     let unreadable = |reason: String| RecordingFault::Unreadable { reason };
+    // One byte more than allowed shows that the stream is too long.
     let mut bytes = Vec::new();
     let read = stream.take(LONGEST_STREAM + 1).read_to_end(&mut bytes);
     read.map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > LONGEST_STREAM {
         return Err(unreadable(format!(
-            "it holds more than {LONGEST_STREAM} bytes"
+            "it has more than {LONGEST_STREAM} bytes"
         )));
     }
     Ok(bytes)

@@ -1,6 +1,6 @@
-//! Recordings as Parquet files: the flat columns of numbers and times, read in batches of samples.
+//! Recordings as Parquet files: columns of numbers and times that are not repeated, read in batches of samples.
 //!
-//! Time stamps and times of day become seconds from the first one on, exactly, before they are rounded to a float.
+//! Time stamps and times of day become seconds since the first one, exactly, before they are rounded to a float.
 
 use std::io;
 use std::sync::Arc;
@@ -27,14 +27,14 @@ use crate::recording::notes::RecordingNote;
 use crate::recording::tables::{ColumnInfo, find_time_range};
 use crate::recording::{ReadOptions, SignalRecording};
 
-/// Samples that are read at once.
+/// Most samples that are read at once.
 const BATCH: usize = 8192;
-/// Fields that are kept at once.
+/// Most fields of all columns that are kept at once.
 const FIELDS: usize = 1 << 22;
-/// Bytes of pages that may be in memory at once.
+/// Most bytes of pages that may be in memory at once.
 const MOST_UNPACKED: u64 = 256 << 20;
 
-/// Apache Parquet.
+/// The format of Apache Parquet.
 pub(crate) struct ParquetFormat;
 
 impl RecordingFormat for ParquetFormat {
@@ -56,6 +56,7 @@ impl RecordingFormat for ParquetFormat {
         file: &str,
         options: &ReadOptions,
     ) -> Result<SignalRecording, RecordingFault> {
+        // A file on disk is read in parts; bytes and streams are in memory.
         match input {
             RecordingInput::File(stream) => read(stream, file, options),
             RecordingInput::Bytes(bytes) => read(Bytes::copy_from_slice(bytes), file, options),
@@ -84,36 +85,42 @@ impl RecordingFormat for ParquetFormat {
     }
 }
 
+/// Reads the columns that are needed.
 fn read(
     stream: impl ChunkReader + 'static,
     file: &str,
     options: &ReadOptions,
 ) -> Result<SignalRecording, RecordingFault> {
+    // The stream is shared between the checks of pages and the reader.
     let bytes = Arc::new(stream);
     let reader =
         SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
     let mut intake = SampleIntake::new(names(&reader), options)?;
+    // The meaning of the numbers in each column.
     let mut kinds: Vec<ParquetValueKind> = (0..width)
         .map(|i| ParquetValueKind::from_column(&schema.column(i)))
         .collect();
+    // Columns of time stamps are reported, because their values change.
     for (i, kind) in kinds.iter().enumerate() {
         if intake.is_place_needed(i) && matches!(kind, ParquetValueKind::Ticks { .. }) {
             intake.note(RecordingNote::info(format!(
-                "`{}` of {file} holds time stamps: it counts in seconds from the first one on.",
+                "`{}` of {file} has time stamps: it is read as seconds since the first one.",
                 schema.column(i).path().string()
             )));
         }
     }
+    // Columns without numbers are not read, but reported as text if they are needed.
     let is_read =
         |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
     let wanted: Vec<bool> = (0..width).map(is_read).collect();
-    // As many samples at once as keep the fields of all columns few.
+    // The size of a batch keeps the number of fields in memory small.
     let n_read = wanted.iter().filter(|is_read| **is_read).count();
     let most = (FIELDS / n_read.max(1)).clamp(1, BATCH);
     let mut sample = vec![SampleField::Number(0.0); width];
     let mut row = 0;
+    // Each group of rows is checked before anything in it is decompressed.
     for group in 0..reader.num_row_groups() {
         check_pages(bytes.as_ref(), reader.metadata().row_group(group), &wanted)?;
         let group = reader.get_row_group(group).map_err(parquet_fault)?;
@@ -125,6 +132,7 @@ fn read(
                 None
             });
         }
+        // Read a batch of every needed column, then pass its samples to the intake.
         let mut left = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
         while left > 0 {
             let n = left.min(most);
@@ -137,16 +145,18 @@ fn read(
             }
             for k in 0..n {
                 row += 1;
+                // Fields of columns that are not read are zeros if they are not needed, otherwise text.
                 for (i, field) in sample.iter_mut().enumerate() {
                     *field = match fields[i].get(k) {
                         Some(field) => *field,
-                        // A column that nobody reads, or that holds no numbers.
+                        // A column that is not needed.
                         None if columns[i].is_none() && !intake.is_place_needed(i) => {
                             SampleField::Number(0.0)
                         }
                         None => SampleField::Text,
                     };
                 }
+                // The text of a field for messages.
                 let text = |i: usize| match sample[i] {
                     SampleField::Text => "a value of another type".to_owned(),
                     _ => "null or NaN".to_owned(),
@@ -161,8 +171,8 @@ fn read(
     intake.finish(file)
 }
 
-/// What reads a column of a row group. Pages that the library has no pure decoder for are read as if they were not packed,
-/// and unpacked on their way.
+/// The reader of a column of a row group. For compressions without a decoder in the library, pages are read as if
+/// they were uncompressed, and decompressed afterwards.
 fn column_reader<R: ChunkReader + 'static>(
     bytes: &Arc<R>,
     group: &dyn RowGroupReader,
@@ -170,11 +180,13 @@ fn column_reader<R: ChunkReader + 'static>(
     column: &ColumnDescPtr,
 ) -> Result<ColumnReader, RecordingFault> {
     let chunk = group.metadata().column(i);
+    // The library decodes these two only with C code.
     let packing = match chunk.compression() {
         Compression::ZSTD(_) => CompressionMethod::Zstd,
         Compression::BROTLI(_) => CompressionMethod::Brotli,
         _ => return group.get_column_reader(i).map_err(parquet_fault),
     };
+    // The copy of the metadata declares the pages as uncompressed.
     let as_stored = chunk
         .clone()
         .into_builder()
@@ -188,7 +200,7 @@ fn column_reader<R: ChunkReader + 'static>(
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
 
-/// Fails when pages of a row group would take more memory than there may be, before any is unpacked.
+/// Fails when the pages of a row group would need too much memory. Nothing is decompressed for this, except gzip.
 fn check_pages<R: ChunkReader>(
     bytes: &R,
     group: &RowGroupMetaData,
@@ -196,17 +208,20 @@ fn check_pages<R: ChunkReader>(
 ) -> Result<(), RecordingFault> {
     let refused = |error: io::Error| parquet_fault(ParquetError::General(error.to_string()));
     let mut sum = 0;
+    // The largest pages of all needed columns are added.
     for (column, _) in group
         .columns()
         .iter()
         .zip(wanted)
         .filter(|(_, is_wanted)| **is_wanted)
     {
+        // The compression decides whether the declared size can be trusted.
         let growth = match column.compression() {
             Compression::GZIP(_) => PageGrowth::Gzip,
             Compression::LZ4 => PageGrowth::OldLz4,
             _ => PageGrowth::Declared,
         };
+        // A dictionary page comes before the data pages.
         let start = column
             .dictionary_page_offset()
             .unwrap_or_else(|| column.data_page_offset());
@@ -220,7 +235,7 @@ fn check_pages<R: ChunkReader>(
         let stream = bytes.get_read(start).map_err(parquet_fault)?;
         sum += parquet_pages::largest_page(stream, length, growth).map_err(refused)?;
     }
-    // One page of every column is in memory at once.
+    // One page of each column is in memory at the same time.
     if sum > MOST_UNPACKED {
         return Err(refused(io::Error::other(
             "its pages would take too much memory",
@@ -229,7 +244,7 @@ fn check_pages<R: ChunkReader>(
     Ok(())
 }
 
-/// A file of which the pages are looked at before they are read.
+/// A stream that is shared by the checks of pages and the reader.
 struct SharedChunkReader<R>(Arc<R>);
 
 impl<R> Clone for SharedChunkReader<R> {
@@ -247,6 +262,7 @@ impl<R: Length> Length for SharedChunkReader<R> {
 impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
     type T = R::T;
 
+    // All methods are those of the stream.
     fn get_read(&self, start: u64) -> parquet::errors::Result<R::T> {
         self.0.get_read(start)
     }
@@ -256,7 +272,7 @@ impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
     }
 }
 
-/// The one table of a file.
+/// The single table of a file.
 fn tables_of(
     stream: SharedChunkReader<impl ChunkReader + 'static>,
 ) -> Result<Vec<TableInfo>, RecordingFault> {
@@ -273,6 +289,7 @@ fn tables_of(
         kind: String::new(),
         columns: schema.columns().iter().map(info).collect(),
         samples: usize::try_from(rows).unwrap_or(0),
+        // The time column is read completely for its range.
         time: find_time_range(&names, |name| {
             read(stream, "", &ReadOptions::single_column(name)).ok()
         }),
@@ -280,7 +297,7 @@ fn tables_of(
     }])
 }
 
-/// Type of a column, in the words of the others.
+/// Type of a column, in the words that other formats use.
 fn kind_of(column: &ColumnDescriptor) -> String {
     let kind = match (
         ParquetValueKind::from_column(column),
@@ -300,45 +317,52 @@ fn kind_of(column: &ColumnDescriptor) -> String {
     kind.to_owned()
 }
 
-/// Names of the columns; those of nested ones hold points.
+/// Names of the columns; names of nested ones contain points.
 fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, RecordingFault> {
     Ok(names(
         &SerializedFileReader::new(stream).map_err(parquet_fault)?,
     ))
 }
 
+/// Names of the columns of an open file, by their paths.
 fn names<R: ChunkReader + 'static>(reader: &SerializedFileReader<R>) -> Vec<String> {
     let schema = reader.metadata().file_metadata().schema_descr();
     let columns = schema.columns().iter();
     columns.map(|column| column.path().string()).collect()
 }
 
-/// What the numbers of a column mean.
+/// The meaning of the numbers of a column.
 enum ParquetValueKind {
+    /// Numbers without a conversion.
     Numbers,
-    /// Whole numbers without a sign, in all bits of what they are stored in.
+    /// Integers without a sign, which use all bits of their type.
     Unsigned,
-    /// Whole numbers of this many to the second; the first one is zero once it is known.
+    /// Times as integers; the first one becomes zero.
     Ticks {
+        /// Ticks per second.
         per_second: f64,
+        /// The first value, once it has been read.
         first: Option<i64>,
     },
-    /// Whole numbers with so many decimals.
+    /// Integers with this many decimal places.
     Decimal(i32),
+    /// Texts, lists, and anything else that is not a number.
     Unusable,
 }
 
 impl ParquetValueKind {
+    /// The meaning from the types in the schema; the logical type takes precedence over the older converted type.
     fn from_column(column: &ColumnDescriptor) -> Self {
         let ticks = |per_second| Self::Ticks {
             per_second,
             first: None,
         };
-        // Texts are no numbers, and a few bytes may stand for very long ones.
+        // Texts are not numbers, and a few bytes of a dictionary may expand to very long ones.
         let is_text = matches!(
             column.physical_type(),
             Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY
         );
+        // Repeated fields have no value per sample.
         if column.max_rep_level() > 0 || is_text {
             return Self::Unusable;
         }
@@ -361,10 +385,10 @@ impl ParquetValueKind {
         }
     }
 
-    /// A whole number in seconds or with its decimals.
+    /// Converts an integer: ticks to seconds, decimals to their value.
     fn convert_integer(&mut self, value: i64) -> f64 {
         match self {
-            // Differences of ticks within a recording are far below 2^53, where floats are exact.
+            // Differences of ticks in a recording are far below 2^53, so that floats are exact.
             Self::Ticks { per_second, first } => {
                 value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second
             }
@@ -374,15 +398,17 @@ impl ParquetValueKind {
         }
     }
 
-    /// The same of a number that is stored in four bytes.
+    /// Converts an integer of four bytes.
     fn convert_short_integer(&mut self, value: i32) -> f64 {
         match self {
+            // The sign bit belongs to the value, so it must be removed before the conversion.
             Self::Unsigned => f64::from(value.cast_unsigned()),
             _ => self.convert_integer(i64::from(value)),
         }
     }
 }
 
+/// Ticks per second of a unit.
 fn per_second(unit: TimeUnit) -> f64 {
     match unit {
         TimeUnit::MILLIS => 1e3,
@@ -391,7 +417,7 @@ fn per_second(unit: TimeUnit) -> f64 {
     }
 }
 
-/// The next `n` fields of a column.
+/// Reads the next `n` fields of a column.
 fn read_batch(
     column: &mut ColumnReader,
     kind: &mut ParquetValueKind,
@@ -407,6 +433,7 @@ fn read_batch(
         ColumnReader::Int64ColumnReader(reader) => read_values(reader, n, |value| {
             SampleField::finite(kind.convert_integer(*value))
         }),
+        // Times of 12 bytes are converted to nanoseconds.
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = ParquetValueKind::Ticks {
                 per_second: 1e9,
@@ -418,6 +445,7 @@ fn read_batch(
             let fields = read_values(reader, n, |value| {
                 SampleField::finite(ticks.convert_integer(value.to_nanos()))
             });
+            // The first value must be kept for the next batch.
             *kind = ticks;
             fields
         }
@@ -427,20 +455,23 @@ fn read_batch(
         ColumnReader::DoubleColumnReader(reader) => {
             read_values(reader, n, |value| SampleField::finite(*value))
         }
-        // Columns of texts are not read.
+        // Columns of texts are never read.
         ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
             Ok(vec![SampleField::Text; n])
         }
     }
 }
 
-/// The next `n` values of a column, those that are null among them.
+/// Reads the next `n` values of a column, including nulls.
+///
+/// Fails when the column ends before the others.
 fn read_values<T: DataType>(
     reader: &mut ColumnReaderImpl<T>,
     n: usize,
     mut field: impl FnMut(&T::T) -> SampleField,
 ) -> Result<Vec<SampleField>, RecordingFault> {
     let mut fields = Vec::with_capacity(n);
+    // A call may return fewer records than requested.
     while fields.len() < n {
         let (mut levels, mut values) = (Vec::new(), Vec::new());
         let wanted = n - fields.len();
@@ -453,10 +484,12 @@ fn read_values<T: DataType>(
                 message: "a column ends before the others do; write the file again".to_owned(),
             });
         }
+        // Without nulls there is one value for each record.
         if n_values == records || n_levels == 0 {
             fields.extend(values.iter().map(&mut field));
             continue;
         }
+        // Otherwise the definition levels state which records have a value.
         let most = levels.iter().copied().max().unwrap_or(0);
         let mut values = values.iter();
         fields.extend(levels.iter().map(|level| {
@@ -471,6 +504,7 @@ fn read_values<T: DataType>(
     Ok(fields)
 }
 
+/// The fault of a file that the library cannot read.
 fn parquet_fault(error: ParquetError) -> RecordingFault {
     let says = match error {
         ParquetError::General(says) | ParquetError::NYI(says) | ParquetError::EOF(says) => says,

@@ -1,10 +1,9 @@
-//! Pages of a Parquet file: looked at before they are unpacked, and unpacked where the library has no decoder without C.
+//! Pages of a Parquet file: checked before decompression, and decompressed if the library has no decoder without C.
 //!
-//! Their headers alone say how large they become, and the library that
-//! reads them believes it.
+//! Only their headers state how large they become, and the library relies on that.
 //!
-//! A column's pages stand one behind the other, each with a header in Thrift's compact protocol (apache/parquet-format,
-//! `parquet.thrift`, struct `PageHeader`). Only the few numbers that say a size are taken from it.
+//! The pages of a column follow each other, each with a header in Thrift's compact protocol (apache/parquet-format,
+//! `parquet.thrift`, struct `PageHeader`). Only the few numbers that state a size are read from it.
 
 use std::io::{self, BufReader, Read};
 
@@ -14,37 +13,38 @@ use parquet::errors::{ParquetError, Result};
 
 use crate::recording::formats::packing::CompressionMethod;
 
-/// The largest page that is unpacked, bytes; writers make pages of one million.
+/// Largest page after decompression in bytes; writers usually make pages of one million.
 const LARGEST_PAGE: u64 = 128 << 20;
-/// The largest page in the old form of LZ4 as it stands in the file: it may grow 255 times before its size is compared
-/// with the header's.
+/// Largest page in the old form of LZ4, in bytes as stored. It may grow 255 times before its size is compared with
+/// that in the header.
 const LARGEST_OLD_LZ4: u64 = 2 << 20;
-/// Structures within one another in a header; Parquet has four.
+/// Deepest nesting of structures in a header; Parquet has four levels.
 const DEEPEST: usize = 16;
 
-/// How much pages may grow when they are unpacked.
+/// How the size of pages is limited during decompression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum PageGrowth {
-    /// To the size that the header says, which whoever unpacks them holds to.
+    /// By the size in the header, which the decoder respects.
     Declared,
-    /// To whatever is in it.
+    /// By nothing but the contents.
     Gzip,
-    /// To whatever is in it, up to 255 times.
+    /// By a factor of 255.
     OldLz4,
 }
 
-/// Looks through the pages of a column that is `length` bytes long; the size of the largest unpacked.
+/// Reads the page headers of a column of `length` bytes; returns the largest size after decompression, in bytes.
 ///
-/// Fails when a page is larger than any that makes sense, or does not keep to its header.
+/// Fails when a page is too large, or larger than its header states.
 pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -> io::Result<u64> {
     let mut stream = BufReader::with_capacity(1 << 16, stream.take(length)).take(length);
     let mut largest = 0;
     while stream.limit() > 0 {
         let page = PageSizes::read(&mut stream)?;
+        // Sizes are checked before the contents are skipped or decompressed.
         if page.packed > stream.limit() {
             return Err(io::Error::other("a page is longer than its column"));
         }
-        // A dictionary's numbers have four bytes at least.
+        // A number of a dictionary has four bytes at least.
         let is_too_large = page.unpacked > LARGEST_PAGE
             || page.words.saturating_mul(4) > page.unpacked
             || (growth == PageGrowth::OldLz4 && page.packed > LARGEST_OLD_LZ4);
@@ -52,27 +52,32 @@ pub(super) fn largest_page(stream: impl Read, length: u64, growth: PageGrowth) -
             return Err(io::Error::other("a page would take too much memory"));
         }
         let mut body = (&mut stream).take(page.packed);
+        // gzip does not limit its output, so it is decompressed once and counted.
         if growth == PageGrowth::Gzip && page.is_packed {
             io::copy(&mut (&mut body).take(page.levels), &mut io::sink())?;
             let inside = page.unpacked.saturating_sub(page.levels);
             let mut all = MultiGzDecoder::new(&mut body).take(inside + 1);
             if io::copy(&mut all, &mut io::sink())? > inside {
-                return Err(io::Error::other("a page is larger than its header says"));
+                return Err(io::Error::other("a page is larger than its header states"));
             }
         }
+        // Skip to the next header.
         io::copy(&mut body, &mut io::sink())?;
         largest = largest.max(page.unpacked);
     }
     Ok(largest)
 }
 
-/// The pages of a column, of which the library takes the bytes as they are stored.
+/// The pages of a column, which the library reads as stored and which are decompressed here.
 pub(super) struct UnpackedPages<P> {
+    /// The pages as stored.
     pub(super) pages: P,
+    /// The compression of the column.
     pub(super) packing: CompressionMethod,
 }
 
 impl<P: PageReader> UnpackedPages<P> {
+    /// Decompresses a page; its other fields stay unchanged.
     fn decompress_page(&self, page: Page) -> Result<Page> {
         let unpack = |packed: &[u8]| {
             let unpacked = self.packing.decompress(packed, LARGEST_PAGE);
@@ -116,7 +121,7 @@ impl<P: PageReader> UnpackedPages<P> {
                 is_compressed,
                 statistics,
             } => {
-                // Levels stand in front and are never packed.
+                // Levels come first and are never compressed.
                 let levels = u64::from(def_levels_byte_len) + u64::from(rep_levels_byte_len);
                 let levels = usize::try_from(levels).unwrap_or(usize::MAX);
                 let Some((levels, values)) = buf.split_at_checked(levels) else {
@@ -168,21 +173,23 @@ impl<P: PageReader> PageReader for UnpackedPages<P> {
     }
 }
 
-/// What a header says of sizes.
+/// The sizes in a page header.
 #[derive(Debug, Default)]
 struct PageSizes {
-    /// Bytes in the file.
+    /// Bytes as stored.
     packed: u64,
-    /// Bytes in memory.
+    /// Bytes after decompression.
     unpacked: u64,
-    /// Numbers of a dictionary.
+    /// Number of values in a dictionary.
     words: u64,
-    /// Bytes at the beginning that are never packed.
+    /// Bytes of levels at the beginning, which are never compressed.
     levels: u64,
+    /// Whether the values are compressed; the older page header has no such field.
     is_packed: bool,
 }
 
 impl PageSizes {
+    /// Reads a header; the numbers of fields are those of `parquet.thrift`.
     fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut page = Self {
             is_packed: true,
@@ -191,6 +198,7 @@ impl PageSizes {
         let mut is_negative = false;
         read_fields(stream, &mut Vec::new(), &mut |path, value| {
             let size = || value.and_then(|n| u64::try_from(n).ok());
+            // Sizes of the page, number of dictionary values, sizes of levels, flag of compression.
             match path {
                 [2] => page.unpacked = size().unwrap_or(u64::MAX),
                 [3] => page.packed = size().unwrap_or(u64::MAX),
@@ -210,7 +218,7 @@ impl PageSizes {
     }
 }
 
-/// Types of Thrift's compact protocol.
+/// Types of values in Thrift's compact protocol.
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
 const BYTE: u8 = 3;
@@ -220,8 +228,8 @@ const LIST: u8 = 9;
 const SET: u8 = 10;
 const STRUCT: u8 = 12;
 
-/// Reads a structure; `tell` hears of every whole number by the numbers of its fields, and of truths, of which a false one
-/// has no value.
+/// Reads a structure. `tell` receives every integer and every boolean with the path of its field numbers; a false
+/// boolean has no value.
 fn read_fields(
     stream: &mut dyn Read,
     path: &mut Vec<i64>,
@@ -232,15 +240,18 @@ fn read_fields(
     }
     let mut field = 0_i64;
     loop {
+        // A header byte of zero ends the structure.
         let head = byte(stream)?;
         if head == 0 {
             return Ok(());
         }
+        // The field number is a difference to the last one, or follows as a number.
         field = match head >> 4 {
             0 => decode_zigzag(varint(stream)?),
             step => field.wrapping_add(i64::from(step)),
         };
         path.push(field);
+        // Integers and booleans are passed on, structures are read, all others are skipped.
         match head & 15 {
             TRUE => tell(path, Some(1)),
             FALSE => tell(path, None),
@@ -255,10 +266,10 @@ fn read_fields(
     }
 }
 
-/// Passes over a value of which nothing is wanted.
+/// Skips a value that is not needed.
 fn skip_value(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Result<()> {
     match kind {
-        // Within a list a truth takes a byte.
+        // In a list a boolean is one byte.
         TRUE | FALSE | BYTE => skip(stream, 1),
         4..=6 => varint(stream).map(drop),
         DOUBLE => skip(stream, 8),
@@ -266,6 +277,7 @@ fn skip_value(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Resul
             let length = varint(stream)?;
             skip(stream, length)
         }
+        // The length of a list is in its first byte, or follows if it is 15 or more.
         LIST | SET if path.len() <= DEEPEST => {
             path.push(0);
             let head = byte(stream)?;
@@ -284,6 +296,7 @@ fn skip_value(stream: &mut dyn Read, kind: u8, path: &mut Vec<i64>) -> io::Resul
     }
 }
 
+/// Skips `n` bytes; fails when there are fewer.
 fn skip(stream: &mut dyn Read, n: u64) -> io::Result<()> {
     if io::copy(&mut stream.take(n), &mut io::sink())? < n {
         return Err(io::ErrorKind::UnexpectedEof.into());
@@ -291,12 +304,14 @@ fn skip(stream: &mut dyn Read, n: u64) -> io::Result<()> {
     Ok(())
 }
 
+/// The next byte.
 fn byte(stream: &mut dyn Read) -> io::Result<u8> {
     let mut one = [0];
     stream.read_exact(&mut one)?;
     Ok(one[0])
 }
 
+/// The next number of variable length: seven bits per byte, the lowest first.
 fn varint(stream: &mut dyn Read) -> io::Result<u64> {
     let mut value = 0;
     for shift in (0..64).step_by(7) {
@@ -309,7 +324,7 @@ fn varint(stream: &mut dyn Read) -> io::Result<u64> {
     Err(io::Error::other("a number in a page's header has no end"))
 }
 
-/// The sign stands in the last bit.
+/// Decodes a signed number, whose sign is in the lowest bit.
 fn decode_zigzag(value: u64) -> i64 {
     (value >> 1).cast_signed() ^ -(value & 1).cast_signed()
 }

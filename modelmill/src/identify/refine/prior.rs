@@ -1,4 +1,4 @@
-//! Nominal values as soft constraints.
+//! Refinement: nominal values as a prior.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -9,7 +9,9 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::text::table::percent;
 
-/// Lets nominal values count as measurements of the relative standard deviation `sigma`.
+/// Adds nominal values as measurements with the relative standard deviation `sigma`, and solves again.
+///
+/// Fails when no base parameter has a nominal value other than 0.
 pub(super) fn refine(
     model: &Model,
     found: &mut WeightedEstimate,
@@ -22,8 +24,8 @@ pub(super) fn refine(
         let parameters = &model.derivation.mechanism.parameters;
         let prior = Remedy::option(OptionName::Prior);
         return Err(Error::input(message!(
-            "{}: {} takes {} of each nominal value for its uncertainty, but the nominal values of {} are 0 or not \
-             given, which says nothing of their size; write others in [parameters] (`nominal = ...`), or leave {} out",
+            "{}: {} uses {} of each nominal value as its uncertainty, but the nominal values of {} are 0 or not \
+             given, so that no uncertainty follows; set them in [parameters] (`nominal = ...`), or omit {}",
             model.path,
             prior,
             percent(Some(sigma)),

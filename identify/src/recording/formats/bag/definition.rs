@@ -1,32 +1,38 @@
 //! Definitions of ROS messages: text of the form `ros2msg` (or `ros1msg`) goes in, a tree of types comes out.
 //!
-//! The definition of a message is followed by those of the messages that it holds, each under a line of `=` and a line
-//! `MSG: package/Name` (MCAP registry of schemas, `ros2msg`).
+//! The definition of a message is followed by the definitions of the messages in it. Each of those follows a line of
+//! `=` and a line `MSG: package/Name` (MCAP registry of schemas, `ros2msg`).
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-/// More messages within one another than any definition has.
+/// Deepest nesting of messages; no real definition reaches it.
 const DEEPEST: usize = 32;
 
-/// Type of a field.
+/// Type of a field of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum RosFieldType {
+    /// A number.
     Number(RosNumberType),
+    /// A string.
     Text,
-    /// Seconds and nanoseconds, of which the seconds of a duration have a sign; those of a time in ROS 1 have none.
+    /// Seconds and nanoseconds. The seconds of a duration are signed, those of a time in ROS 1 are not.
     Time {
+        /// Whether the seconds are signed.
         is_signed: bool,
     },
+    /// Another message.
     Message(Rc<RosMessageDefinition>),
-    /// As many as are given, or as the message says.
+    /// A list: of fixed length if that is given, otherwise each message states the length.
     List(Box<RosFieldType>, Option<usize>),
 }
 
 /// Types of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RosNumberType {
+    /// One byte; zero is false.
     Bool,
+    /// Signed integers and unsigned ones, by their number of bits.
     I8,
     U8,
     I16,
@@ -39,20 +45,24 @@ pub(super) enum RosNumberType {
     F64,
 }
 
-/// A message: its fields in their order.
+/// A message type: its fields in order, each with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RosMessageDefinition {
+    /// Names and types.
     pub(super) fields: Vec<(String, RosFieldType)>,
 }
 
-/// Whose rules hold.
+/// The version of ROS, whose rules for types differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum RosVersion {
+    /// ROS 1.
     One,
+    /// ROS 2.
     Two,
 }
 
 impl RosNumberType {
+    // `float` and `double` are the names in IDL.
     const NAMES: [(&'static str, Self); 14] = [
         ("bool", Self::Bool),
         ("boolean", Self::Bool),
@@ -70,6 +80,7 @@ impl RosNumberType {
         ("double", Self::F64),
     ];
 
+    /// The type with a name in a definition; `byte` differs between the versions.
     fn from_name(name: &str, ros: RosVersion) -> Option<Self> {
         match (name, ros) {
             ("byte", RosVersion::One) => return Some(Self::I8),
@@ -80,13 +91,13 @@ impl RosNumberType {
         found.map(|(_, number)| *number)
     }
 
-    /// What definitions call it.
+    /// Its usual name in definitions.
     pub(super) fn name(self) -> &'static str {
         let found = Self::NAMES.iter().find(|(_, number)| *number == self);
         found.map_or("", |(name, _)| name)
     }
 
-    /// Bytes that it takes.
+    /// Its size in a message, bytes.
     pub(super) fn size(self) -> usize {
         match self {
             Self::Bool | Self::I8 | Self::U8 => 1,
@@ -97,9 +108,9 @@ impl RosNumberType {
     }
 }
 
-/// The definition of the message `name` in `text`, with those that it needs.
+/// Parses the definition of the message `name` in `text`, and those of the messages in it.
 ///
-/// Fails when one of them is missing or cannot be read.
+/// Fails when a definition is missing or a line cannot be parsed.
 pub(super) fn parse_definition(
     name: &str,
     text: &str,
@@ -107,6 +118,7 @@ pub(super) fn parse_definition(
 ) -> Result<Rc<RosMessageDefinition>, String> {
     let own = short_type_name(name);
     let mut texts = BTreeMap::new();
+    // Split the text at the lines of `=` into one list of lines per type.
     let (mut current, mut lines) = (own.clone(), Vec::new());
     for line in text.lines() {
         let trimmed = line.trim();
@@ -117,6 +129,7 @@ pub(super) fn parse_definition(
             lines.clear();
             current = String::new();
         } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
+            // The line behind the separator has the name of the next type.
             current = short_type_name(name.trim());
         } else {
             lines.push(trimmed);
@@ -131,18 +144,23 @@ pub(super) fn parse_definition(
     reader.parse_message(&own, 0)
 }
 
-/// `package/Name`, however much stands between.
+/// The name without `/msg/`, as `package/Name`.
 fn short_type_name(name: &str) -> String {
     name.replace("/msg/", "/")
 }
 
+/// Parses definitions and keeps those that are done.
 struct RosDefinitionParser<'a> {
+    /// Lines of the definitions that are not parsed yet, by type.
     texts: BTreeMap<String, Vec<&'a str>>,
+    /// Types that are done.
     done: BTreeMap<String, Rc<RosMessageDefinition>>,
+    /// The version of ROS, for names of types.
     ros: RosVersion,
 }
 
 impl RosDefinitionParser<'_> {
+    /// Parses the definition of one type; `depth` is its nesting.
     fn parse_message(
         &mut self,
         name: &str,
@@ -151,9 +169,11 @@ impl RosDefinitionParser<'_> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
         }
+        // A type that contains itself would recurse without end.
         if depth > DEEPEST {
-            return Err(format!("`{name}` holds itself"));
+            return Err(format!("`{name}` contains itself"));
         }
+        // A type that the file does not define may be a common one.
         let Some(lines) = self.texts.get(name).cloned() else {
             return match well_known_definition(name) {
                 Some(text) => {
@@ -165,7 +185,9 @@ impl RosDefinitionParser<'_> {
             };
         };
         let mut fields = Vec::new();
+        // One field per line: type, name, and possibly a default value.
         for line in lines {
+            // Comments start with `#`.
             let line = line.split('#').next().unwrap_or("").trim();
             let Some((kind, rest)) = line.split_once(char::is_whitespace) else {
                 if line.is_empty() {
@@ -177,7 +199,7 @@ impl RosDefinitionParser<'_> {
             let end = rest
                 .find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'))
                 .unwrap_or(rest.len());
-            // A constant takes no room in a message.
+            // A constant is not part of a message.
             if rest[end..].trim_start().starts_with('=') {
                 continue;
             }
@@ -194,12 +216,14 @@ impl RosDefinitionParser<'_> {
         Ok(definition)
     }
 
+    /// Parses the type of a field in the message `within`.
     fn parse_field_type(
         &mut self,
         text: &str,
         within: &str,
         depth: usize,
     ) -> Result<RosFieldType, String> {
+        // `type[]`, `type[n]` and `type[<=n]` are lists; the last one has a variable length.
         if let Some((of, length)) = text
             .strip_suffix(']')
             .and_then(|text| text.rsplit_once('['))
@@ -216,19 +240,24 @@ impl RosDefinitionParser<'_> {
             };
             return Ok(RosFieldType::List(Box::new(of), length));
         }
+        // A string may have a bound, as in `string<=10`.
         let bare = text.split("<=").next().unwrap_or(text);
         if let Some(number) = RosNumberType::from_name(bare, self.ros) {
             return Ok(RosFieldType::Number(number));
         }
+        // Types with a name of their own.
         match (bare, self.ros) {
             ("string", _) => return Ok(RosFieldType::Text),
             ("wstring", _) => {
-                return Err(format!("`{within}` holds a `wstring`, which is not read"));
+                return Err(format!(
+                    "`{within}` contains a `wstring`, which is not supported"
+                ));
             }
             ("time", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: false }),
             ("duration", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: true }),
             _ => {}
         }
+        // Names without a package belong to the package of the message.
         let full = match short_type_name(bare) {
             header if header == "Header" => "std_msgs/Header".to_owned(),
             full if full.contains('/') => full,
@@ -237,6 +266,7 @@ impl RosDefinitionParser<'_> {
                 format!("{package}/{short}")
             }
         };
+        // Times of ROS 2 are messages with a fixed meaning.
         if full == "builtin_interfaces/Time" || full == "builtin_interfaces/Duration" {
             return Ok(RosFieldType::Time { is_signed: true });
         }
@@ -244,12 +274,13 @@ impl RosDefinitionParser<'_> {
     }
 }
 
-/// Messages that are everywhere, for files that do not say what is in them, as rosbag2 wrote until 2023.
+/// Definitions of common types, for files without definitions, as rosbag2 wrote them until 2023.
 fn well_known_definition(name: &str) -> Option<&'static str> {
     let found = WELL_KNOWN.iter().find(|(known, _)| *known == name);
     found.map(|(_, text)| *text)
 }
 
+/// Common types and the texts of their definitions.
 const WELL_KNOWN: [(&str, &str); 22] = [
     (
         "std_msgs/Header",

@@ -1,8 +1,8 @@
-//! Logs of robots: messages of several topics go in, one by one; columns go out, joined on time.
+//! Robot logs: messages of several topics go in, one by one. Columns come out, joined on time.
 //!
-//! A number of a message becomes the column `topic.field`, an element of a list `topic.field_1` or, where names stand
-//! beside the list as in `sensor_msgs/JointState`, `topic.position.elbow`. The time of a message is its `header.stamp`, and
-//! that of its arrival where it bears none.
+//! A number of a message becomes the column `topic.field`, an element of a list `topic.field_1`. If the message has a
+//! list of names of the same length, as `sensor_msgs/JointState`, the column is `topic.position.elbow`. The time of a
+//! message is its `header.stamp`, or the time of its arrival if it has none.
 
 mod definition;
 mod message;
@@ -23,90 +23,116 @@ use crate::words::backquoted_list;
 use definition::RosVersion;
 use message::{RosMessageContent, RosMessageReader};
 
-/// More forms of messages than any topic has, such as sets of joints that speak on it in turns.
+/// Most forms of messages of a topic, such as sets of joints that are published in turns.
 const MOST_LAYOUTS: usize = 64;
-/// Forms of bytes that are remembered.
+/// Most forms of bytes that are remembered.
 const MOST_SHAPES: usize = 1024;
-/// More columns than any recording has.
+/// Most columns of a topic.
 const MOST_COLUMNS: usize = 1 << 17;
-/// The room of an arrival in numbers, with what is sorted and joined of it.
+/// Memory of an arrival, in numbers, including what is sorted and joined later.
 const ARRIVAL: usize = 8;
-/// Times below this many nanoseconds, 104 days, are exact as seconds; others count from the first one on.
+/// Times below this many nanoseconds, 104 days, are exact as seconds. Larger ones are counted from the first one.
 const EXACT: i64 = 1 << 53;
 
-/// What is taken of a log while its messages go by.
+/// Collects the columns of a log while its messages are read.
 pub(super) struct BagCollector<'a> {
+    /// Topics in the order of registration.
     topics: Vec<BagTopic>,
-    /// Columns whose numbers are kept.
+    /// Whether the numbers of a column are kept, by its name.
     is_kept: &'a dyn Fn(&str) -> bool,
+    /// Numbers that are kept so far, with those for arrivals.
     kept_numbers: usize,
+    /// Most numbers that may be kept.
     max_numbers: usize,
+    /// The last message; kept to use its memory again.
     content: RosMessageContent,
 }
 
-/// How the messages of a topic are written.
+/// The encoding of the messages of a topic.
 pub(super) struct BagEncoding<'a> {
-    /// `cdr`, `ros1`, or what is not read.
+    /// `cdr` or `ros1`; others are not supported.
     pub(super) messages: &'a str,
-    /// `ros2msg`, `ros1msg`, or what is not read.
+    /// `ros2msg`, `ros1msg` or empty; others are not supported.
     pub(super) definition: &'a str,
+    /// Text of the definition.
     pub(super) text: &'a str,
 }
 
+/// A topic with its messages so far.
 struct BagTopic {
+    /// Name without a leading slash.
     name: String,
+    /// Type of its messages.
     kind: String,
-    /// What reads its messages, or why they are left aside.
+    /// The reader of its messages, or why they are skipped.
     reader: Result<RosMessageReader, String>,
+    /// All columns that any of its messages has.
     columns: IndexMap<String, TopicColumn>,
+    /// Forms of its messages.
     layouts: Vec<BagMessageLayout>,
+    /// Form of each shape of bytes that is remembered.
     shapes: BTreeMap<Vec<u8>, usize>,
+    /// Messages whose numbers are kept.
     messages: Vec<MessageArrival>,
+    /// Number of messages.
     count: usize,
 }
 
-/// A form of messages, and what is known of those that have it.
+/// A form of messages: those with the same columns.
 struct BagMessageLayout {
-    /// Its columns by their places.
+    /// Indices of its columns.
     places: Vec<usize>,
-    /// Whether numbers of it are kept.
+    /// Whether numbers of any of its columns are kept.
     is_kept: bool,
+    /// Number of messages.
     count: usize,
-    /// First and last time of arrival and in the messages, ns.
+    /// First and last time of arrival, ns.
     log: Option<(i64, i64)>,
+    /// First and last time in the messages, ns.
     stamp: Option<(i64, i64)>,
-    /// Whether all messages bear a time other than zero.
+    /// Whether all messages have a time of their own other than zero.
     has_stamps: bool,
 }
 
+/// A column of a topic.
 struct TopicColumn {
+    /// Type of its numbers.
     kind: &'static str,
+    /// Forms of messages that have the column.
     layouts: BTreeSet<usize>,
+    /// Its numbers, if they are kept.
     values: Option<Vec<f64>>,
 }
 
-/// One message, beside its numbers.
+/// One message, without its numbers.
 #[derive(Clone, Copy)]
 struct MessageArrival {
+    /// Index of its form.
     layout: usize,
-    /// Times of its arrival and in it, ns.
+    /// Time of its arrival, ns.
     log: i64,
+    /// Time in the message, ns.
     stamp: Option<i64>,
 }
 
-/// Columns of a topic that are in the same messages.
+/// Columns of a topic that occur in the same messages.
 struct BagTable {
+    /// Name of the topic.
     topic: String,
+    /// Names, types, and the numbers if they are kept.
     columns: Vec<(String, &'static str, Option<Vec<f64>>)>,
-    /// Times of the messages whose numbers are kept, ns.
+    /// Times of the messages whose numbers are kept, ns, in the order of arrival.
     time: Vec<i64>,
+    /// Whether the times are those of the messages; otherwise they are those of arrival.
     has_stamps: bool,
+    /// Number of messages.
     samples: usize,
-    /// First and last time, ns.
+    /// First and last time of all messages, ns.
     span: Option<(i64, i64)>,
 }
 
 impl<'a> BagCollector<'a> {
+    /// Starts a collection; `most` is the largest number of numbers to keep.
     fn new(is_kept: &'a dyn Fn(&str) -> bool, most: usize) -> Self {
         Self {
             topics: Vec::new(),
@@ -117,23 +143,25 @@ impl<'a> BagCollector<'a> {
         }
     }
 
-    /// A topic, to which [`Bag::message`] refers by the number that comes back.
+    /// Registers a topic. The result identifies it in [`Self::take_message`].
     pub(super) fn register_topic(
         &mut self,
         name: &str,
         kind: &str,
         encoding: &BagEncoding<'_>,
     ) -> usize {
+        // Encoding and definition decide the version of ROS.
         let ros = match (encoding.messages, encoding.definition) {
             ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
             ("ros1", "ros1msg") => Ok(RosVersion::One),
-            ("cdr" | "ros1", other) => {
-                Err(format!("its definition is `{other}`, which is not read"))
-            }
+            ("cdr" | "ros1", other) => Err(format!(
+                "its definition is `{other}`, which is not supported"
+            )),
             (other, _) => Err(format!(
-                "its messages are encoded as `{other}`, which is not read"
+                "its messages are encoded as `{other}`, which is not supported"
             )),
         };
+        // A topic that cannot be read is kept with the reason and reported only if it is listed.
         let reader = ros.and_then(|ros| {
             let definition = definition::parse_definition(kind, encoding.text, ros)?;
             Ok(RosMessageReader::new(definition, ros))
@@ -154,7 +182,8 @@ impl<'a> BagCollector<'a> {
 
     /// Takes a message that arrived at `log`, ns.
     ///
-    /// Fails when it cannot be read although others of its topic could, and when more numbers would be kept than allowed.
+    /// Fails when it cannot be read although earlier messages of its topic could be, or when too many numbers would
+    /// be kept.
     pub(super) fn take_message(
         &mut self,
         topic: usize,
@@ -166,11 +195,13 @@ impl<'a> BagCollector<'a> {
         let Ok(reader) = &topic.reader else {
             return Ok(());
         };
+        // Read the numbers, then find the form of the message.
         let layout = reader
             .read(bytes, &mut self.content)
             .and_then(|()| topic.layout_of_message(bytes, &self.content, self.is_kept));
         let layout = match layout {
             Ok(layout) => layout,
+            // If the first message fails, the complete topic is skipped.
             Err(says) if topic.count == 1 => {
                 topic.reader = Err(format!("its first message cannot be read: {says}"));
                 return Ok(());
@@ -185,6 +216,7 @@ impl<'a> BagCollector<'a> {
                 });
             }
         };
+        // Count the message and extend the time ranges of its form.
         let form = &mut topic.layouts[layout];
         let stamp = self.content.stamp;
         form.count += 1;
@@ -194,6 +226,7 @@ impl<'a> BagCollector<'a> {
         if !form.is_kept {
             return Ok(());
         }
+        // Keep the numbers of needed columns.
         for (place, value) in form.places.iter().zip(&self.content.numbers) {
             if let Some(values) = &mut topic.columns[*place].values {
                 values.push(*value);
@@ -202,6 +235,7 @@ impl<'a> BagCollector<'a> {
         }
         topic.messages.push(MessageArrival { layout, log, stamp });
         self.kept_numbers += ARRIVAL;
+        // The limit includes memory for sorting and joining.
         if self.kept_numbers > self.max_numbers {
             return Err(RecordingFault::TooLarge {
                 line: topic.count as u64,
@@ -213,27 +247,33 @@ impl<'a> BagCollector<'a> {
         Ok(())
     }
 
+    /// The tables of all topics.
     fn tables(self) -> Vec<BagTable> {
         self.topics.into_iter().flat_map(BagTopic::tables).collect()
     }
 }
 
 impl BagTopic {
-    /// The form of a message whose numbers and shape are known.
+    /// The form of a message with known numbers and shape; new forms and columns are added.
+    ///
+    /// Fails when columns have equal names, or when there are too many columns or forms.
     fn layout_of_message(
         &mut self,
         bytes: &[u8],
         content: &RosMessageContent,
         is_kept: &dyn Fn(&str) -> bool,
     ) -> Result<usize, String> {
+        // Most messages have a shape that is known.
         if let Some(known) = self.shapes.get(&content.shape) {
             return Ok(*known);
         }
+        // Otherwise the names of the columns are decoded from the bytes.
         let reader = self.reader.as_ref().map_err(Clone::clone)?;
         let columns = reader.columns(bytes)?;
         if columns.len() != content.numbers.len() {
-            return Err("its columns cannot be told".to_owned());
+            return Err("its columns cannot be determined".to_owned());
         }
+        // Indices of the columns; new ones are added to the topic.
         let mut places = Vec::with_capacity(columns.len());
         for (name, kind) in columns {
             let name = format!("{}.{name}", self.name);
@@ -255,10 +295,12 @@ impl BagTopic {
         if self.columns.len() > MOST_COLUMNS {
             return Err("it has more columns than any recording".to_owned());
         }
+        // Another shape may have the same columns.
         let known = self
             .layouts
             .iter()
             .position(|layout| layout.places == places);
+        // A new form is registered in all of its columns.
         let layout = known.unwrap_or_else(|| {
             for place in &places {
                 self.columns[*place].layouts.insert(self.layouts.len());
@@ -278,6 +320,7 @@ impl BagTopic {
         if self.layouts.len() > MOST_LAYOUTS {
             return Err("names or lengths of lists in it change again and again".to_owned());
         }
+        // Memory of shapes is limited; they are decoded again when needed.
         if self.shapes.len() >= MOST_SHAPES {
             self.shapes.clear();
         }
@@ -285,8 +328,9 @@ impl BagTopic {
         Ok(layout)
     }
 
-    /// Its columns, those of the same messages together; messages in the order in which they arrived.
+    /// Its columns, grouped by the messages in which they occur; messages are in the order of their arrival.
     fn tables(self) -> Vec<BagTable> {
+        // Columns with the same set of forms belong to one table.
         let mut tables: IndexMap<BTreeSet<usize>, Vec<(String, TopicColumn)>> = IndexMap::new();
         for (name, column) in self.columns {
             tables
@@ -294,7 +338,7 @@ impl BagTopic {
                 .or_default()
                 .push((name, column));
         }
-        // Publishers that know no time leave it at zero.
+        // Publishers without a clock leave the time at zero.
         let has_stamps = self.layouts.iter().all(|layout| layout.has_stamps);
         let time_of = |one: &MessageArrival| match one.stamp {
             Some(stamp) if has_stamps => stamp,
@@ -302,6 +346,7 @@ impl BagTopic {
         };
         let mut all = Vec::new();
         for (layouts, columns) in tables {
+            // The messages of the table, sorted by arrival.
             let messages: Vec<&MessageArrival> = self
                 .messages
                 .iter()
@@ -311,6 +356,7 @@ impl BagTopic {
             order.sort_by_key(|k| messages[*k].log);
             let sorted = |values: Vec<f64>| order.iter().map(|k| values[*k]).collect();
             let forms = || layouts.iter().map(|layout| &self.layouts[*layout]);
+            // The time range covers all messages, also those that are not kept.
             let mut span = None;
             for (first, last) in
                 forms().filter_map(|form| if has_stamps { form.stamp } else { form.log })
@@ -334,23 +380,26 @@ impl BagTopic {
     }
 }
 
-/// Shows all messages of a log to a [`Bag`].
+/// A function that passes all messages of a log to a collector.
 pub(super) type BagReplay<'a> =
     &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
-/// The recording of a log: the columns that are needed, joined on time.
+/// Reads a log: the needed columns, joined on time.
 pub(super) fn read(
     show: BagReplay<'_>,
     file: &str,
     options: &ReadOptions,
 ) -> Result<SignalRecording, RecordingFault> {
+    // Numbers of needed columns are kept while the messages are read.
     let is_kept = |name: &str| options.is_column_needed(name);
     let mut bag = BagCollector::new(&is_kept, options.max_numbers);
     show(&mut bag)?;
     let tables = bag.tables();
+    // The first column is the time; then the columns of all topics follow.
     let mut intake = SampleIntake::new(names_of(&tables), options)?;
     let mut parts = Vec::new();
     let mut place = 1;
+    // Each table with needed columns becomes a part to be joined.
     for table in tables {
         let mut columns = Vec::new();
         for (_, _, values) in table.columns {
@@ -363,15 +412,17 @@ pub(super) fn read(
             parts.push((table.topic, table.has_stamps, table.time, columns));
         }
     }
+    // Topics without times of their own are reported.
     let late: Vec<String> = (parts.iter().filter(|part| !part.1))
         .map(|part| part.0.clone())
         .collect();
     if !late.is_empty() {
         intake.note(RecordingNote::info(format!(
-            "Messages of {} in {file} bear no time of their own: the time is that of their arrival.",
+            "Messages of {} in {file} have no time of their own: their time is that of arrival.",
             backquoted_list(&late)
         )));
     }
+    // Large times are counted from the first one, so that seconds are exact.
     let times = || parts.iter().flat_map(|part| &part.2);
     let is_exact = times().all(|t| (-EXACT..EXACT).contains(t));
     let zero = if is_exact {
@@ -387,6 +438,7 @@ pub(super) fn read(
     let Some(together) = join_parts(parts.collect(), &mut |note| intake.note(note))? else {
         return Err(RecordingFault::NoSamples);
     };
+    // Pass the joined rows to the intake.
     let mut sample = vec![SampleField::Number(0.0); intake.width()];
     for (k, time) in together.time.iter().enumerate() {
         sample[0] = SampleField::finite(*time);
@@ -401,19 +453,20 @@ pub(super) fn read(
     intake.finish(file)
 }
 
-/// Names of the columns of a log, the time in front.
+/// Names of the columns of a log, the time first.
 pub(super) fn names(show: BagReplay<'_>) -> Result<Vec<String>, RecordingFault> {
     let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     Ok(names_of(&bag.tables()))
 }
 
-/// The topics of a log.
+/// The topics of a log; no numbers are kept.
 pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
     let mut bag = BagCollector::new(&|_| false, usize::MAX);
     show(&mut bag)?;
     let mut found = Vec::new();
     for topic in bag.topics {
+        // The part of the description that is the same for all cases.
         let bare = TableInfo {
             name: topic.name.clone(),
             kind: topic.kind.clone(),
@@ -422,14 +475,16 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
             time: None,
             remark: None,
         };
+        // A topic that cannot be read has its reason as a remark.
         if let Err(says) = &topic.reader {
             found.push(TableInfo {
-                remark: Some(format!("left aside: {says}")),
+                remark: Some(format!("skipped: {says}")),
                 ..bare
             });
             continue;
         }
         let tables = topic.tables();
+        // A topic without numbers has no table.
         if tables.is_empty() {
             let holds = if bare.samples == 0 {
                 "no messages"
@@ -437,13 +492,13 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
                 "no numbers"
             };
             found.push(TableInfo {
-                remark: Some(format!("it holds {holds}")),
+                remark: Some(format!("it contains {holds}")),
                 ..bare
             });
             continue;
         }
         for table in tables {
-            // As it is read: from the first sample on, unless the numbers are small.
+            // As for reading: times are counted from the first one, unless they are small.
             let span = table.span.map(|(least, most)| {
                 let is_exact = -EXACT < least && most < EXACT;
                 let zero = if is_exact { 0 } else { least };
@@ -473,18 +528,20 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
     Ok(found)
 }
 
+/// Names of the columns of all tables, the time first.
 fn names_of(tables: &[BagTable]) -> Vec<String> {
     let names = tables.iter().flat_map(|table| &table.columns);
     let names = names.map(|(name, _, _)| name.clone());
     std::iter::once("t".to_owned()).chain(names).collect()
 }
 
-/// Widens a span of times to hold another one.
+/// Extends a time range to include another time, ns.
 fn extend_span(span: &mut Option<(i64, i64)>, time: i64) {
     let (first, last) = span.unwrap_or((time, time));
     *span = Some((first.min(time), last.max(time)));
 }
 
+/// Nanoseconds as seconds.
 fn seconds(nanoseconds: i64) -> f64 {
     nanoseconds as f64 / 1e9
 }
