@@ -93,8 +93,8 @@ fn a_variant_costs_what_its_forces_say() {
     for says in [
         "1/2*d3*m4",
         "spindle_left (-1500.00 to 1500.00) is now exceeded",
-        "work given",
-        "error against",
+        "positive work, J",
+        "Error relative to the measured forces",
     ] {
         assert!(text.contains(says), "{says}: {text}");
     }
