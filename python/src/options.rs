@@ -43,7 +43,7 @@ impl ReadingOptions {
         }
         if self.decimate == 0 {
             return Err(
-                "decimate=0: expected a whole number of at least 1; 1 keeps all samples".to_owned(),
+                "decimate=0: expected an integer of at least 1; 1 keeps all samples".to_owned(),
             );
         }
         if let Some((from, to)) = self.between

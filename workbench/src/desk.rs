@@ -173,7 +173,7 @@ mod tests {
         let (status, fault) = told(&desk.answer_request("edit", edit(41, "schema = [").as_bytes()));
         assert_eq!((status, &fault["valid"]), (200, &json!(false)));
         assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
-        // Beside the file as saved, and beside a model that is there.
+        // Compared with the saved file, and with another model of the folder.
         let text = view["text"].as_str().unwrap();
         let saved = desk.answer_request("edit", edit(42, text).as_bytes());
         assert_eq!(told(&saved).1["valid"], true, "{saved}");

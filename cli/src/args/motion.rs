@@ -91,7 +91,7 @@ pub(crate) struct ExciteArgs {
 fn parse_harmonics(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if (1..=50).contains(&value) => Ok(value),
-        _ => Err("expected a whole number from 1 to 50".to_owned()),
+        _ => Err("expected an integer from 1 to 50".to_owned()),
     }
 }
 
@@ -99,7 +99,7 @@ fn parse_harmonics(text: &str) -> Result<usize, String> {
 pub(super) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if (1..=1_000_000).contains(&value) => Ok(value),
-        _ => Err("expected a whole number from 1 to 1000000".to_owned()),
+        _ => Err("expected an integer from 1 to 1000000".to_owned()),
     }
 }
 

@@ -244,6 +244,6 @@ fn parse_between(text: &str) -> Result<(f64, f64), String> {
 fn parse_decimate(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(value) if value > 0 => Ok(value),
-        _ => Err("expected a whole number of at least 1; 1 keeps all samples".to_owned()),
+        _ => Err("expected an integer of at least 1; 1 keeps all samples".to_owned()),
     }
 }

@@ -223,7 +223,7 @@ mod tests {
     use super::*;
     use crate::args::{CommandLine, ProgramCommand};
 
-    /// What the page shows is understood, and asks for the same recordings read in the same way.
+    /// Commands that the page shows are valid, and read the same recordings in the same way.
     #[test]
     fn commands_of_the_page_are_understood() {
         let line = "modelmill work arm.toml --data a.csv b.csv --check c.csv --map 'q=x [deg]' --trim 5 --smoothing fourier \

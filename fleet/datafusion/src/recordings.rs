@@ -136,7 +136,7 @@ impl RecordingsSource {
     /// The summary of a file. A fault of the recording is part of the summary; a store that does not answer is an
     /// error.
     async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
-        // Objects of a store are read as a whole; files are opened by the library.
+        // Objects of a store are read completely; files are opened by the library.
         let bytes = match self {
             Self::Disk => None,
             Self::Store(store) => {

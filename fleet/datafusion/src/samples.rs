@@ -64,7 +64,7 @@ impl GroupSamples {
             }
             if let Some(kept) = self.recordings.get_mut(this) {
                 for (kept, column) in kept.iter_mut().zip(&columns) {
-                    // Without null values whole slices can be copied.
+                    // Without null values complete slices can be copied.
                     if column.null_count() == 0 {
                         kept.extend_from_slice(&column.values()[from..to]);
                     } else {

@@ -167,7 +167,7 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
         .map(|some| sum(&mut some.iter()))
         .collect();
     near(&whole, &sum(&mut parts.iter().rev()), &ground);
-    // As bytes, which are told apart from bytes that were changed.
+    // As bytes; changed bytes are recognised.
     let bytes = whole.bytes();
     let again = FleetSummary::from_bytes(&bytes).expect("a summary");
     assert_eq!(again.bytes(), bytes);

@@ -140,7 +140,7 @@ def _pair(of: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 _TYPES: list[tuple[tuple[str, ...], str, Callable[[Any], Any]]] = [
     (("cutoff_hz", "period", "band_hz"), "a number", float),
-    (("order", "decimate"), "a whole number", index),
+    (("order", "decimate"), "an integer", index),
     (("trim",), "a number of samples, or two of them", _pair(index)),
     (("between",), "two times in s", _pair(float)),
 ]

@@ -1,4 +1,4 @@
-"""Rigs, numeric models of whole machines: recordings without hardware, and reduction to planar models."""
+"""Rigs, numeric models of complete machines: recordings without hardware, and reduction to planar models."""
 
 from __future__ import annotations
 

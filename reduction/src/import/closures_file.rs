@@ -122,7 +122,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
             ));
         }
     }
-    // Closures of three conditions (origins) or six (whole frames).
+    // Closures of three conditions (origins) or six (complete frames).
     for (k, ends) in pairs.iter().enumerate() {
         let is_full = match kinds.get(k).map(|kind| kind.to_lowercase()).as_deref() {
             None | Some("6d") => true,

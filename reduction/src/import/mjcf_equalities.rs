@@ -120,7 +120,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 },
                 _ => in_world(one).inverse().compose(&in_world(other)),
             };
-            // The weld holds both bodies together at the anchor.
+            // The weld connects both bodies at the anchor.
             let shift = DescriptionPose {
                 p: anchor,
                 r: Matrix3::identity(),

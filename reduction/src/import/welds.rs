@@ -215,7 +215,7 @@ fn axes_along(direction: &Vector3<f64>) -> Option<Matrix3<f64>> {
 
 /// Attaches the links between weld and joint to the other end of the weld, and makes the joint the closure.
 fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut: &LoopCut) {
-    // The frames that the weld holds together.
+    // The two frames that the weld connects.
     let (other, there) = description.closures[closure].ends[1 - end];
     let (_, here) = description.closures[closure].ends[end];
     let own = cut.inverted_links[cut.inverted_links.len() - 1];

@@ -233,7 +233,7 @@ impl ModelTextBuilder<'_> {
 mod tests {
     use super::match_lines;
 
-    /// A tendon over two joints gives way to one that has the first alone, in whatever order they stand.
+    /// A tendon over two joints gets the second one if another tendon has only the first, in any order.
     #[test]
     fn no_line_takes_what_another_alone_can_have() {
         assert_eq!(match_lines(&[vec![0, 1], vec![0]]), [Some(1), Some(0)]);
