@@ -11,6 +11,7 @@ use crate::spelling::PythonSpelling;
 
 /// An exception `modelmill.ModelmillError` with a text; `diagnostics` is a list of objects.
 pub(crate) fn modelmill_error(py: Python<'_>, says: &str, diagnostics: &Value) -> PyErr {
+    /// The exception class of the Python part, imported at its first use.
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let class = CLASS.import(py, "modelmill._errors", "ModelmillError");
     let made = class.and_then(|class| class.call1((says, diagnostics.to_string())));

@@ -14,6 +14,7 @@ use crate::spelling::PythonSpelling;
 /// A plan with its model derived.
 #[pyclass(frozen)]
 pub(crate) struct FleetGround {
+    /// The plan with its derived model.
     ground: FleetModel,
 }
 
@@ -74,6 +75,7 @@ pub(crate) fn fleet_merge(
 
 #[pymethods]
 impl FleetGround {
+    /// Derives the model of a plan, which is given as JSON.
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
         let made =
@@ -88,6 +90,7 @@ impl FleetGround {
         self.ground.columns()
     }
 
+    /// The summary of a recording from its columns in SI units, as bytes.
     fn summarise<'py>(
         &self,
         py: Python<'py>,
@@ -103,6 +106,7 @@ impl FleetGround {
         PyBytes::new(py, &bytes)
     }
 
+    /// The summary of a recording from a file, as bytes.
     fn summarise_file<'py>(
         &self,
         py: Python<'py>,

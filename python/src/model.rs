@@ -34,6 +34,7 @@ const FEW: usize = 256;
 /// Largest robot description that is read, bytes.
 const LARGEST_DESCRIPTION: u64 = 16 << 20;
 
+/// A function of Python that is called with name, steps done and number of steps of a job.
 pub(crate) type ProgressCallback<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
 
 /// A host, and a listener for its jobs.
@@ -95,6 +96,7 @@ pub(crate) fn import_text(
     pose: Vec<(String, f64)>,
 ) -> PyResult<(String, RemarkList)> {
     let (host, listener) = new_host(Vec::new(), false);
+    // Text of a file of limited size.
     let read = |path: &Path| {
         let read = host.files().read_text(path, LARGEST_DESCRIPTION);
         read.map_err(|error| {
@@ -110,6 +112,7 @@ pub(crate) fn import_text(
             Some(text) => (text, None),
             None => (read(Path::new(name))?, Some(Path::new(name))),
         };
+        // Without a given file, the closures of a URDF are those of a `robot.yaml` in the same folder.
         let beside = path.filter(|path| path.extension().is_some_and(|e| e == "urdf"));
         let beside = beside.map(|path| path.with_file_name("robot.yaml"));
         let closures = closures.or(beside.filter(|path| path.is_file()));
@@ -129,12 +132,16 @@ pub(crate) fn import_text(
 #[pyclass(frozen, name = "Model")]
 #[derive(Clone)]
 pub(crate) struct CoreModel {
+    /// The derived model.
     model: Model,
+    /// Its functions at states, shared by all copies.
     functions: Arc<ModelFunctions>,
+    /// Listener for the jobs of its host.
     listener: Arc<JobListener>,
 }
 
 impl CoreModel {
+    /// A model with the listener of its host.
     fn new(model: Model, listener: Arc<JobListener>) -> Self {
         Self {
             functions: Arc::new(model.functions()),
@@ -157,6 +164,7 @@ impl CoreModel {
         Self::new(model, Arc::clone(&self.listener))
     }
 
+    /// Runs work on this model in a separate thread, with progress and interrupts.
     fn run_interruptible<T: Send>(
         &self,
         py: Python<'_>,
@@ -180,51 +188,61 @@ fn function_by_name(py: Python<'_>, function: &str) -> PyResult<ModelFunction> {
     })
 }
 
+/// The recordings of the library in objects of Python.
 fn recordings(all: &[PyRef<'_, PythonRecording>]) -> Vec<Arc<PreparedRecording>> {
     all.iter().map(|one| Arc::clone(&one.recording)).collect()
 }
 
+/// References to recordings, as methods of the library take them.
 fn borrow_recordings(all: &[Arc<PreparedRecording>]) -> Vec<&PreparedRecording> {
     all.iter().map(|one| &**one).collect()
 }
 
 #[pymethods]
 impl CoreModel {
+    /// Name of the model.
     #[getter]
     fn name(&self) -> &str {
         &self.model.name
     }
 
+    /// Path of the model file, or the name of the text.
     #[getter]
     fn path(&self) -> &str {
         &self.model.path
     }
 
+    /// Text of the model file.
     #[getter]
     fn text(&self) -> &str {
         self.model.text()
     }
 
+    /// Title of the model, if the file has one.
     #[getter]
     fn title(&self) -> Option<&str> {
         self.model.derivation.mechanism.title.as_deref()
     }
 
+    /// Names of the active coordinates.
     #[getter]
     fn coordinates(&self) -> Vec<String> {
         self.model.active_coordinates()
     }
 
+    /// Names of the passive coordinates.
     #[getter]
     fn passive(&self) -> Vec<String> {
         self.model.passive_coordinates()
     }
 
+    /// Names of the drives.
     #[getter]
     fn drives(&self) -> Vec<String> {
         self.model.drives()
     }
 
+    /// Nominal values of the base parameters, in SI units.
     #[getter]
     fn nominal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.model.nominal)
@@ -262,6 +280,7 @@ impl CoreModel {
         remarks(&self.model.nominal_values().notes)
     }
 
+    /// The equations as text in a format.
     fn equations(&self, py: Python<'_>, format: &str) -> PyResult<String> {
         let format = match format {
             "text" => Some(PageFormat::Text),
@@ -283,6 +302,7 @@ impl CoreModel {
         Ok(written.text)
     }
 
+    /// Checks the model.
     fn check(&self, py: Python<'_>) -> PyResult<PythonResult> {
         let checked = self.run_interruptible(py, None, || self.model.check())?;
         Ok(PythonResult::new(
@@ -292,6 +312,7 @@ impl CoreModel {
         ))
     }
 
+    /// The picture of the mechanism as SVG, at given coordinates and from a direction.
     fn picture(
         &self,
         py: Python<'_>,
@@ -340,6 +361,7 @@ impl CoreModel {
                 .map(|array| state_matrix(py, array))
                 .transpose()?,
         };
+        // A thread costs more time than a few states.
         let few = given.q.numbers.len() <= FEW * given.q.width;
         let functions = &self.functions;
         let job = || {
@@ -397,6 +419,7 @@ impl CoreModel {
         })
     }
 
+    /// Compares measured forces with those of the model.
     fn compare(
         &self,
         py: Python<'_>,
@@ -414,6 +437,7 @@ impl CoreModel {
         })
     }
 
+    /// Estimates the base parameters.
     #[allow(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn identify(
         &self,
@@ -446,6 +470,7 @@ impl CoreModel {
         })
     }
 
+    /// Searches for missing effects; with `held` all parameters keep their values.
     fn diagnose(
         &self,
         py: Python<'_>,
@@ -471,6 +496,7 @@ impl CoreModel {
             )?;
             let spelling = PythonSpelling;
             let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
+            // The model with the effects that were found.
             let better = match found.entries.as_slice() {
                 [] => None,
                 entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
@@ -496,6 +522,7 @@ impl CoreModel {
         let what = valid_options(py, options::runs_options(&per_run, &loads))?;
         let mut all: Vec<Result<Arc<PreparedRecording>, UnreadRun>> =
             recordings(&data).into_iter().map(Ok).collect();
+        // Runs that could not be read keep their places in the sequence.
         for (place, file, says) in unread {
             let error = Error::input(says);
             all.insert(place.min(all.len()), Err(UnreadRun { file, error }));
@@ -509,6 +536,7 @@ impl CoreModel {
         })
     }
 
+    /// Plans a trajectory; with recordings it distinguishes an effect from others.
     fn excite(
         &self,
         py: Python<'_>,
@@ -636,6 +664,7 @@ impl CoreModel {
         let models = [&self.model, &other.model.clone()];
         let runs = [recordings(&data), recordings(&other_data)];
         self.run_interruptible(py, progress.as_ref(), || {
+            // Changes of the text and the equations, then those along recordings.
             let [before, after] = models;
             let changes = ModelChanges::from_models(before, after);
             let mut object = changes.json(before, after);

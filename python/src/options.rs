@@ -18,21 +18,34 @@ pub(crate) type OptionResult<T> = Result<T, String>;
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct ReadingOptions {
+    /// Names of the model with the columns of the recording.
     columns: Vec<(String, String)>,
+    /// Cut-off frequency of the low-pass, Hz.
     cutoff_hz: Option<f64>,
+    /// Order of the low-pass.
     order: Option<usize>,
+    /// Numbers of samples to remove at the start and at the end.
     trim: Option<(usize, usize)>,
+    /// Decimation: one of so many samples is kept.
     decimate: usize,
+    /// Source of rates and accelerations: `recorded` or `positions`.
     source: String,
+    /// Method of smoothing.
     smoothing: String,
+    /// Period of the motion, s, for a Fourier series.
     period: Option<f64>,
+    /// Highest frequency at which forces are compared, Hz.
     band_hz: Option<f64>,
+    /// Whether samples with NaN or empty fields are left out.
     skip_bad_samples: bool,
+    /// Whether forces during contacts and pushes are left out of fits and error figures.
     leave_out_events: bool,
+    /// First and last time that are used, s.
     between: Option<(f64, f64)>,
 }
 
 impl ReadingOptions {
+    /// The options of the library; fails with the first invalid value.
     pub(crate) fn reading(&self) -> OptionResult<RecordingOptions> {
         let usual = StatePreparation::default();
         let order = self.order.unwrap_or(usual.order);
@@ -81,6 +94,7 @@ impl ReadingOptions {
         })
     }
 
+    /// The method of smoothing; a period selects the Fourier series.
     fn smoothing(&self) -> OptionResult<SmoothingMethod> {
         let period = check_positive("period", self.period, "a time in s such as 7.29")?;
         Ok(match (self.smoothing.as_str(), period) {
@@ -100,15 +114,22 @@ impl ReadingOptions {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct EstimationOptions {
+    /// Weights of the equations.
     weights: String,
+    /// Bound of the robust weights.
     robust: Option<f64>,
+    /// Relative standard deviation of the nominal values, as prior knowledge.
     prior: Option<f64>,
+    /// Whether the parameters must be physically possible.
     physical: bool,
+    /// Whether parameters that the recording does not support are left out.
     essential: bool,
+    /// Equations of a drive that is slower than this fraction of its fastest rate are excluded.
     standstill: Option<f64>,
 }
 
 impl EstimationOptions {
+    /// The options of the library; fails with the first invalid value.
     pub(crate) fn estimation(&self) -> OptionResult<EstimatorOptions> {
         let prior = check_positive(
             "prior",
@@ -157,21 +178,33 @@ impl EstimationOptions {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct ExcitationOptions {
+    /// Number of harmonics.
     harmonics: usize,
     period: f64,
+    /// Limits as texts, such as `q1=-1:1`.
     limits: Vec<String>,
+    /// Criterion of the search: `condition` or `log_det`.
     criterion: String,
+    /// Number of random trajectories that are tried first.
     random: usize,
+    /// Number of the best random trajectories from which the search starts.
     starts: usize,
+    /// Seed of the random numbers.
     seed: u64,
+    /// Sampling rate of the trajectory, Hz.
     rate: f64,
+    /// The effect that is to be distinguished from others.
     separate: Option<String>,
+    /// Its alternatives: effects with which it may be confused.
     apart_from: Vec<String>,
+    /// Effects that are present in both cases and missing in the model file.
     beside: Vec<String>,
+    /// Standard deviation of the forces, N or N m.
     noise: Option<f64>,
 }
 
 impl ExcitationOptions {
+    /// The options of the library; fails with the first invalid value.
     pub(crate) fn request(&self) -> OptionResult<ExcitationRequest> {
         let within = |name: &str, value: f64, least: f64, most: f64| {
             if (least..=most).contains(&value) {

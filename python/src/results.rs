@@ -15,6 +15,7 @@ use crate::spelling::PythonSpelling;
 /// Remarks, each with severity and text.
 pub(crate) type RemarkList = Vec<(&'static str, String)>;
 
+/// Notes of the library in the spelling of Python.
 pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) -> RemarkList {
     let one = |note: &RecordingNote| {
         let severity = match note.severity {
@@ -29,23 +30,28 @@ pub(crate) fn remarks<'a>(notes: impl IntoIterator<Item = &'a RecordingNote>) ->
 /// The source of a recording: files of one run, or named columns.
 #[derive(FromPyObject)]
 pub(crate) enum PythonSource<'py> {
+    /// Paths of files.
     Files(Vec<PathBuf>),
+    /// Names and values of columns, in SI units.
     Table(Vec<(String, PyReadonlyArray1<'py, f64>)>),
 }
 
 /// A recording that was read and prepared for a model.
 #[pyclass(frozen, name = "Recording")]
 pub(crate) struct PythonRecording {
+    /// The recording of the library.
     pub(crate) recording: Arc<PreparedRecording>,
 }
 
 #[pymethods]
 impl PythonRecording {
+    /// Path of the file, or the name of the table.
     #[getter]
     fn file(&self) -> String {
         self.recording.file().to_owned()
     }
 
+    /// Remarks of the preparation.
     #[getter]
     fn notes(&self) -> RemarkList {
         remarks(self.recording.notes())
@@ -55,6 +61,7 @@ impl PythonRecording {
     #[pyo3(name = "prepared")]
     fn prepared_arrays<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
         let runs = || self.recording.segments.iter().map(|segment| &segment.run);
+        // Each column over all segments.
         let joined = |of: &dyn Fn(&modelmill::recording::PreparedRun) -> &[Vec<f64>]| {
             let width = runs().next().map_or(0, |run| of(run).len());
             let column = |k: usize| {
@@ -73,7 +80,9 @@ impl PythonRecording {
     }
 }
 
+/// One array for each coordinate or drive.
 type ArrayColumns<'py> = Vec<Bound<'py, PyArray1<f64>>>;
+/// Times, then columns of positions, rates and accelerations.
 type PreparedArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
     ArrayColumns<'py>,
@@ -100,6 +109,7 @@ pub(crate) struct PythonResult {
 }
 
 impl PythonResult {
+    /// A result with JSON, text and remarks.
     pub(crate) fn new(json: &Value, text: &str, notes: RemarkList) -> Self {
         Self {
             json: json.to_string(),
@@ -109,16 +119,19 @@ impl PythonResult {
         }
     }
 
+    /// The result with an HTML page.
     pub(crate) fn with_page(mut self, page: String) -> Self {
         self.page = Some(page);
         self
     }
 
+    /// The result with values of the base parameters.
     pub(crate) fn with_values(mut self, values: Vec<f64>) -> Self {
         self.values = values;
         self
     }
 
+    /// The result with a model.
     pub(crate) fn with_model(mut self, model: Option<CoreModel>) -> Self {
         self.model = model;
         self
@@ -127,31 +140,37 @@ impl PythonResult {
 
 #[pymethods]
 impl PythonResult {
+    /// The JSON that the program prints with `--json`.
     #[getter]
     fn json(&self) -> &str {
         &self.json
     }
 
+    /// The text that the program prints.
     #[getter]
     fn text(&self) -> &str {
         &self.text
     }
 
+    /// The HTML page, if there is one.
     #[getter]
     fn page(&self) -> Option<&str> {
         self.page.as_deref()
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
     fn notes(&self) -> RemarkList {
         self.notes.clone()
     }
 
+    /// Values of the base parameters; empty if there are none.
     #[getter]
     fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_slice(py, &self.values)
     }
 
+    /// The model with the result, if there is one.
     #[getter]
     fn model(&self) -> Option<CoreModel> {
         self.model.clone()
@@ -161,32 +180,38 @@ impl PythonResult {
 /// A planned trajectory.
 #[pyclass(frozen, name = "Excitation")]
 pub(crate) struct PythonExcitation {
+    /// The result of the library.
     pub(crate) found: modelmill::excite::ExcitationResult,
 }
 
 #[pymethods]
 impl PythonExcitation {
+    /// All figures as JSON.
     #[getter]
     fn json(&self) -> String {
         self.found.json().to_string()
     }
 
+    /// The figures as text.
     #[getter]
     fn text(&self) -> String {
         let plain = modelmill::text::style::TerminalStyle::PLAIN;
         self.found.text(plain, &PythonSpelling)
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
     fn notes(&self) -> RemarkList {
         remarks(&self.found.notes)
     }
 
+    /// The picture of the trajectory as SVG.
     #[getter]
     fn picture(&self) -> &str {
         &self.found.picture
     }
 
+    /// The trajectory as CSV.
     #[getter]
     fn csv(&self) -> String {
         self.found.csv()

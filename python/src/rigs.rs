@@ -14,11 +14,13 @@ use crate::work::run_interruptible;
 /// The recording of a simulated rig.
 #[pyclass(frozen, name = "Simulation")]
 pub(crate) struct PythonSimulation {
+    /// The simulation of the library.
     made: modelmill::simulate::RigSimulation,
 }
 
 #[pymethods]
 impl PythonSimulation {
+    /// Rig, number of samples, seed, columns and notes as JSON.
     #[getter]
     fn json(&self) -> String {
         let made = &self.made;
@@ -34,6 +36,7 @@ impl PythonSimulation {
         .to_string()
     }
 
+    /// The simulation in one line.
     #[getter]
     fn text(&self) -> String {
         let made = &self.made;
@@ -42,17 +45,20 @@ impl PythonSimulation {
         format!("{}: {samples} of {drives}, seed {}", made.rig, made.seed)
     }
 
+    /// Remarks, each with severity and text.
     #[getter]
     fn notes(&self) -> RemarkList {
         let notes = self.made.notes.iter();
         notes.map(|says| ("info", says.clone())).collect()
     }
 
+    /// The recording as CSV.
     #[getter]
     fn csv(&self) -> String {
         self.made.csv()
     }
 
+    /// Names and values of the columns, in SI units.
     fn columns<'py>(&self, py: Python<'py>) -> Vec<(String, Bound<'py, PyArray1<f64>>)> {
         let columns = self.made.run.columns.iter();
         columns

@@ -67,6 +67,7 @@ impl StepSpelling for PythonSpelling {
     }
 }
 
+/// The places of an effect as an argument: a text for one, a list for several.
 fn places(at: &[String]) -> String {
     match at {
         [one] => format!("{one:?}"),
@@ -91,6 +92,7 @@ enum PythonName {
     Method(&'static str),
 }
 
+/// The keyword or method of an option.
 fn spelled_option(option: OptionName) -> PythonName {
     match option {
         OptionName::From => PythonName::Keyword("apart_from"),
@@ -100,6 +102,7 @@ fn spelled_option(option: OptionName) -> PythonName {
     }
 }
 
+/// The method of a command.
 fn method_of_command(command: CommandName) -> &'static str {
     match command {
         CommandName::Evaluate => "inverse_dynamics",

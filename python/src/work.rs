@@ -21,9 +21,12 @@ const TICK: Duration = Duration::from_millis(50);
 #[derive(Default)]
 pub(crate) struct JobListener(Mutex<ListenerState>);
 
+/// The state of a listener.
 #[derive(Default)]
 struct ListenerState {
+    /// Running jobs, the last one started last: name, number of steps, handle.
     jobs: Vec<(String, usize, Arc<JobHandle>)>,
+    /// Whether jobs are cancelled, also those that start later.
     stops: bool,
 }
 
@@ -42,11 +45,13 @@ impl ProgressListener for JobListener {
 }
 
 impl JobListener {
+    /// Access to the state.
     fn lock_state(&self) -> MutexGuard<'_, ListenerState> {
         // A panic of another thread leaves a valid list of jobs.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Cancels all jobs, also those that start later.
     fn stop(&self) {
         let mut heard = self.lock_state();
         heard.stops = true;
@@ -55,6 +60,7 @@ impl JobListener {
         }
     }
 
+    /// Forgets all jobs and permits new ones.
     fn reset(&self) {
         *self.lock_state() = ListenerState::default();
     }
@@ -77,6 +83,7 @@ pub(crate) fn run_interruptible<T: Send>(
 ) -> PyResult<T> {
     let (sender, mut receiver) = channel::<()>();
     let (found, stopped) = thread::scope(|scope| {
+        // The work runs in another thread.
         let worker = scope.spawn(move || {
             // Dropped when the work ends, also by a panic; this wakes the waiting thread.
             let _ends = sender;
@@ -89,6 +96,7 @@ pub(crate) fn run_interruptible<T: Send>(
             else {
                 break;
             };
+            // Progress is reported until the work is stopped.
             let told = match (progress, listener.current_job()) {
                 (Some(progress), Some(now)) if stopped.is_none() => progress.call1(now).map(|_| ()),
                 _ => Ok(()),
@@ -100,6 +108,7 @@ pub(crate) fn run_interruptible<T: Send>(
         }
         (worker.join(), stopped)
     });
+    // The next call must not be cancelled.
     if stopped.is_some() {
         listener.reset();
     }
