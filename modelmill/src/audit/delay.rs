@@ -4,6 +4,12 @@
 use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 
 use super::rows::AuditRows;
+use super::thresholds::{
+    COMMON_DELAY_FEWEST_DRIVES, DELAY_LEAST_GAIN, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS,
+    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONGEST_DELAY_S, LONGEST_DELAY_SHARE,
+    LONGEST_DELAY_STEPS, PROMPT_DRIVE_MOST_HALF_WIDTH, SAME_DELAY_TOLERANCE_STEPS,
+    SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS, SINGLE_DELAY_LEAST_STEPS,
+};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::{percent, significant};
@@ -12,32 +18,6 @@ use crate::text::table::{percent, significant};
 const LOOKED_AT: usize = 9000;
 /// Smallest number of samples for each drive.
 const FEWEST: usize = 1200;
-/// Longest delay that is searched for, s.
-const LONGEST: f64 = 0.25;
-/// The same in samples, for recordings with few samples per second.
-const LONGEST_SAMPLES: f64 = 64.0;
-/// The same as a fraction of the recording.
-const LONGEST_PART: f64 = 0.1;
-/// Fraction of a drive's fastest rate below which a sample is not used: friction near reversals causes an apparent
-/// delay.
-const SLOW: f64 = 0.1;
-
-/// A delay is reported if it exceeds the half width of its interval by this factor, since model errors are not random.
-const CLEAR: f64 = 1.5;
-/// The same for a drive that alone is delayed: missing laws often act on one drive.
-const CLEAR_ALONE: f64 = 3.0;
-/// The shortest delay that is reported, in samples: for all drives.
-const LEAST: f64 = 0.2;
-/// The same for single drives.
-const LEAST_ALONE: f64 = 0.3;
-/// Delays that differ by less than this fraction of a sample are equal.
-const ALIKE: f64 = 0.1;
-/// Required decrease of the residual for a delay of all drives, as a fraction.
-const GAIN: f64 = 0.003;
-/// The same for a drive that alone is delayed.
-const GAIN_ALONE: f64 = 0.03;
-/// Decrease of the residual from which on the note is a warning.
-const GRAVE: f64 = 0.1;
 
 /// Delays of the force signals of a segment.
 pub(super) struct ForceDelayAudit {
@@ -56,9 +36,9 @@ impl ForceDelayAudit {
         let n = run.time.len();
         let duration = run.time.last()? - run.time.first()?;
         let step = duration / (n - 1) as f64;
-        let longest = LONGEST
-            .max(LONGEST_SAMPLES * step)
-            .min(LONGEST_PART * duration);
+        let longest = LONGEST_DELAY_S
+            .max(LONGEST_DELAY_STEPS * step)
+            .min(LONGEST_DELAY_SHARE * duration);
         // Both ends are excluded by the longest delay, so that every shifted sample exists.
         let from = run.time.partition_point(|t| *t < run.time[0] + longest);
         let to = run
@@ -74,7 +54,7 @@ impl ForceDelayAudit {
         for (d, rates) in rows.motion[1].iter().enumerate() {
             let fastest = rates.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
             for (i, rate) in rates.iter().enumerate() {
-                counts[i * drives + d] = rate.abs() > SLOW * fastest;
+                counts[i * drives + d] = rate.abs() > DELAY_REVERSAL_RATE_SHARE * fastest;
             }
         }
         let delays = ForceDelays::from_audit(&DelayAudit {
@@ -104,7 +84,9 @@ impl ForceDelayAudit {
         // A clock delays all forces alike; if drives differ, the model lacks a law.
         let differ = |one: &DelayEstimate, other: &DelayEstimate| {
             let apart = (one.seconds - other.seconds).abs();
-            apart > CLEAR * one.half_width.hypot(other.half_width) + ALIKE * self.step
+            apart
+                > DELAY_LEAST_HALF_WIDTHS * one.half_width.hypot(other.half_width)
+                    + SAME_DELAY_TOLERANCE_STEPS * self.step
         };
         let agree = (alone.iter().enumerate())
             .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
@@ -112,8 +94,10 @@ impl ForceDelayAudit {
         let telling = |one: &&DelayEstimate| {
             one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0
         };
-        let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(2);
-        let is_there = self.is_clear(all, CLEAR, LEAST) && self.gain(1) > GAIN;
+        let agree = agree
+            && alone.iter().filter(telling).count() >= alone.len().min(COMMON_DELAY_FEWEST_DRIVES);
+        let is_there = self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS)
+            && self.gain(1) > DELAY_LEAST_GAIN;
         (agree && is_there).then_some(all)
     }
 
@@ -126,8 +110,14 @@ impl ForceDelayAudit {
         } = &self.delays;
         // A delayed drive must be clear and must reduce its own residual.
         let late: Vec<usize> = (0..alone.len())
-            .filter(|d| self.is_clear(alone[*d], CLEAR_ALONE, LEAST_ALONE))
-            .filter(|d| left[2][*d] < (1.0 - GAIN_ALONE) * left[0][*d])
+            .filter(|d| {
+                self.is_clear(
+                    alone[*d],
+                    SINGLE_DELAY_LEAST_HALF_WIDTHS,
+                    SINGLE_DELAY_LEAST_STEPS,
+                )
+            })
+            .filter(|d| left[2][*d] < (1.0 - SINGLE_DELAY_LEAST_GAIN) * left[0][*d])
             .collect();
         let Some(least) = (late.iter().map(|d| alone[*d].seconds.abs())).min_by(f64::total_cmp)
         else {
@@ -136,9 +126,11 @@ impl ForceDelayAudit {
         let is_late = |d: usize| late.contains(&d);
         // The other drives must show that the common clock is correct.
         let others = || (0..alone.len()).filter(|d| !is_late(*d)).map(|d| alone[d]);
-        let in_time =
-            others().all(|one| one.seconds.abs() < CLEAR * one.half_width + ALIKE * self.step);
-        let known = others().any(|one| one.half_width < 0.5 * least);
+        let in_time = others().all(|one| {
+            one.seconds.abs()
+                < DELAY_LEAST_HALF_WIDTHS * one.half_width + SAME_DELAY_TOLERANCE_STEPS * self.step
+        });
+        let known = others().any(|one| one.half_width < PROMPT_DRIVE_MOST_HALF_WIDTH * least);
         let same_side = late.iter().all(|d| alone[*d].seconds > 0.0)
             || late.iter().all(|d| alone[*d].seconds < 0.0);
         if in_time && known && same_side {
@@ -257,7 +249,7 @@ impl ForceDelayAudit {
 
     /// The note as a warning if the delay causes a large part of the residual.
     fn graded_note(&self, with: usize, says: String) -> RecordingNote {
-        if self.gain(with) > GRAVE {
+        if self.gain(with) > DELAY_WARNING_GAIN {
             RecordingNote::warning(says)
         } else {
             RecordingNote::info(says)

@@ -15,6 +15,12 @@ use modelmill_identify::{RecordingNote, robust_fit};
 use nalgebra::DVector;
 
 use super::rows::AuditRows;
+use super::thresholds::{
+    EVENT_FEWEST_FILTER_WIDTHS, EVENT_LEAST_FORCE_SHARE, EVENT_LULL_FILTER_WIDTHS,
+    EVENT_RESIDUAL_FACTOR, EVENT_REVERSAL_RATE_SHARE, EVENTS_MOST_DURATION_SHARE, MOST_EVENTS,
+    NEIGHBOUR_MOST_DISTANCE_SIGMAS, REPEATED_LEAST_RESIDUAL_SHARE, SHORTEST_EVENT_S,
+    USUAL_RESIDUAL_SHARE,
+};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::significant;
@@ -27,28 +33,10 @@ const FINE: f64 = 25.0;
 const FEWEST_TOGETHER: usize = 5;
 /// Largest width of the median filter, in samples.
 const MOST_TOGETHER: usize = 11;
-/// An event exceeds the usual residual by this factor.
-const ABOVE: f64 = 5.0;
-/// The usual residual is the one that this fraction of the run stays below.
-const USUAL: f64 = 0.8;
-/// An event is at least this fraction of the drive's force.
-const LEAST: f64 = 0.02;
-/// Largest number of events in a run; more are a property of the machine.
-const MOST: usize = 4;
-/// Largest fraction of the run that events may last.
-const LONGEST: f64 = 0.15;
-/// Shortest event, s.
-const SHORTEST: f64 = 0.1;
 /// Number of samples of an event that are compared with the rest of the run.
 const COMPARED: usize = 40;
 /// Number of nearest samples of the rest for each of them.
 const NEIGHBOURS: usize = 5;
-/// Largest distance of such a neighbour, in standard deviations of the states.
-const NEAR: f64 = 1.0;
-/// Neighbours with less than this fraction of the residual show that it does not repeat.
-const ALIKE: f64 = 0.4;
-/// Fraction of its fastest rate below which a drive may be reversing.
-const SLOW: f64 = 0.1;
 
 /// An interval of time in which forces act that no parameters explain.
 #[derive(Clone, Debug)]
@@ -147,8 +135,8 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
     let wanted = LOOKED_AT.max(floor_to_count(FINE * duration));
     let samples: Vec<usize> = (0..n).step_by((n / wanted).max(1)).collect();
     let rate = samples.len() as f64 / duration;
-    let together = floor_to_count(SHORTEST * rate).clamp(FEWEST_TOGETHER, MOST_TOGETHER);
-    if samples.len() < 40 * MOST_TOGETHER {
+    let together = floor_to_count(SHORTEST_EVENT_S * rate).clamp(FEWEST_TOGETHER, MOST_TOGETHER);
+    if samples.len() < EVENT_FEWEST_FILTER_WIDTHS * MOST_TOGETHER {
         return None;
     }
     // The residual of a robust fit is compared with its own usual level, drive by drive.
@@ -167,7 +155,9 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         // Short lulls belong to the event about them, and so does a reversal.
         let mut end = i;
         let mut lull = 0;
-        while i < flagged.len() && (flagged[i] || (end > start && lull < 2 * together)) {
+        while i < flagged.len()
+            && (flagged[i] || (end > start && lull < EVENT_LULL_FILTER_WIDTHS * together))
+        {
             if flagged[i] {
                 end = i + 1;
                 lull = 0;
@@ -182,7 +172,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
             reach(start.saturating_sub(together / 2)),
             reach(end + together / 2),
         ];
-        let lasts = |end: usize| reach(end - 1) - reach(start) >= SHORTEST;
+        let lasts = |end: usize| reach(end - 1) - reach(start) >= SHORTEST_EVENT_S;
         if end > start && lasts(end) {
             // A drive belongs to the event unless its residual repeats elsewhere.
             let around = start.saturating_sub(together)..end + together;
@@ -202,7 +192,8 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         i = i.max(start + 1);
     }
     // What happens often or for long is no event.
-    let is_rare = events.len() <= MOST && (lasted as f64) < LONGEST * flagged.len() as f64;
+    let is_rare = events.len() <= MOST_EVENTS
+        && (lasted as f64) < EVENTS_MOST_DURATION_SHARE * flagged.len() as f64;
     is_rare.then_some(events)
 }
 
@@ -297,9 +288,9 @@ impl UnexplainedForces {
                 quantile((start..end).map(|k| self.rest[at(k)].abs()).collect(), 0.5)
             })
             .collect();
-        let usual = quantile(values.clone(), USUAL);
+        let usual = quantile(values.clone(), USUAL_RESIDUAL_SHARE);
         ResidualLevel {
-            bound: (ABOVE * usual).max(LEAST * size),
+            bound: (EVENT_RESIDUAL_FACTOR * usual).max(EVENT_LEAST_FORCE_SHARE * size),
             values,
             reverses,
             usual,
@@ -358,12 +349,16 @@ impl UnexplainedForces {
             }
             near.select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0));
             let near = &near[..NEIGHBOURS];
-            let is_near = near.iter().all(|(apart, _)| *apart < NEAR * NEAR);
+            let is_near = near.iter().all(|(apart, _)| {
+                *apart < NEIGHBOUR_MOST_DISTANCE_SIGMAS * NEIGHBOUR_MOST_DISTANCE_SIGMAS
+            });
             // The mean residual of the neighbours is compared with that of the event.
             let theirs =
                 near.iter().map(|(_, k)| self.rest[at(*k)]).sum::<f64>() / NEIGHBOURS as f64;
             let own = self.rest[at(*i)];
-            alone += usize::from(is_near && theirs * own.signum() < ALIKE * own.abs());
+            alone += usize::from(
+                is_near && theirs * own.signum() < REPEATED_LEAST_RESIDUAL_SHARE * own.abs(),
+            );
         }
         2 * alone < asked
     }
@@ -372,7 +367,9 @@ impl UnexplainedForces {
 /// Samples at which a drive reverses or stands still: there friction takes values that no law of the model gives.
 fn reversal_mask(rate: &[f64]) -> Vec<bool> {
     let fastest = rate.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    rate.iter().map(|v| v.abs() < SLOW * fastest).collect()
+    rate.iter()
+        .map(|v| v.abs() < EVENT_REVERSAL_RATE_SHARE * fastest)
+        .collect()
 }
 
 /// The quantile of some values; 0 without values.

@@ -10,13 +10,11 @@ use modelmill_identify::ForceAudit;
 use nalgebra::DVector;
 
 use super::rows::AuditRows;
-use super::{AuditFinding, BETTER, GRAVITY};
+use super::thresholds::{CORRECTION_MOST_RATIO, GRAVITY_LEAST_ERROR};
+use super::{AuditFinding, GRAVITY};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
-
-/// Relative error, with friction and offsets of the drives fitted, below which gravity is accepted.
-const BEARABLE: f64 = 0.01;
 
 /// A finding if reversed gravity explains the forces far better. `measured` are the forces at the samples, interleaved.
 pub(super) fn reversed_gravity_finding(
@@ -31,11 +29,11 @@ pub(super) fn reversed_gravity_finding(
     let error = |regressor| ForceAudit::new(regressor)?.error(measured);
     // Both fits include friction, inertia and offsets of the drives.
     let before = error(AuditRows::new(model, data, samples)?.regressor)?;
-    if before < BEARABLE {
+    if before < GRAVITY_LEAST_ERROR {
         return None;
     }
     let after = error(AuditRows::with_reversed_gravity(model, data, samples)?)?;
-    (after < BETTER * before).then(|| {
+    (after < CORRECTION_MOST_RATIO * before).then(|| {
         let says = "gravity seems to point in the opposite direction".to_owned();
         let file = &data.run.file;
         let note = message!(

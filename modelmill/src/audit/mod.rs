@@ -6,6 +6,7 @@ pub(crate) mod events;
 mod gravity;
 mod nominal_forces;
 mod rows;
+mod thresholds;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
@@ -18,6 +19,10 @@ use crate::model::Model;
 use crate::stretch::RecordingSegment;
 use crate::text::table::percent;
 use delay::ForceDelayAudit;
+use thresholds::{
+    AUDIT_FEWEST_SAMPLES, CORRECTION_MOST_RATIO, CORRECTION_ROWS_PER_COLUMN, SAME_ERROR_TOLERANCE,
+    UNREACHABLE_MOST_ERROR, WIRING_LEAST_ERROR,
+};
 
 /// Kinds of suspicions. Until one is resolved, other findings may be a consequence of it.
 const EXCHANGED: &str = "exchanged_columns";
@@ -33,20 +38,8 @@ const LOOKED_AT: usize = 1500;
 const ROWS_LOOKED_AT: usize = 12_000;
 /// Smallest number of samples, even for many drives.
 const FEWEST_LOOKED_AT: usize = 300;
-/// Recordings with fewer samples are not checked.
-const FEWEST: usize = 100;
-/// Relative errors below this one cause no suspicion of exchanged columns.
-const BEARABLE: f64 = 0.05;
-/// If the mechanism cannot reach the poses as recorded, a change must reduce the error to this relative value.
-const CONVINCING: f64 = 0.3;
-/// An exchange must reduce the error to this fraction.
-const BETTER: f64 = 0.5;
-/// Changes whose errors agree within this fraction are indistinguishable.
-const ALIKE: f64 = 0.05;
 /// Errors below this one are rounding.
 const EXACT: f64 = 1e-6;
-/// Smallest number of rows per base parameter with which a change is judged.
-const ROWS_PER_COLUMN: usize = 4;
 /// Largest number of multiplications for all changes of the motion, some ten seconds of one core; exceeds 32 bits.
 const AFFORDABLE: u64 = 20_000_000_000;
 
@@ -95,7 +88,7 @@ impl AuditFinding {
 fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let run = &data.run;
     let n = data.samples();
-    let Some(forces) = run.force.as_deref().filter(|_| n > FEWEST) else {
+    let Some(forces) = run.force.as_deref().filter(|_| n > AUDIT_FEWEST_SAMPLES) else {
         return Vec::new();
     };
     let n_drives = forces.len();
@@ -115,11 +108,13 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let with_delay = late.as_ref().and_then(ForceDelayAudit::residual_with_delay);
     let mut notes = Vec::new();
     // Forces delayed by a large part of a period resemble those of another drive.
-    if error > BEARABLE && with_delay.is_none_or(|left| left > BETTER * error) {
+    if error > WIRING_LEAST_ERROR
+        && with_delay.is_none_or(|left| left > CORRECTION_MOST_RATIO * error)
+    {
         let drives = model.drives();
         let columns = Remedy::option(OptionName::Columns);
         if let Some((suspect, [before, after])) = as_it_is.find_wiring_fault(&measured)
-            && after < BETTER * before
+            && after < CORRECTION_MOST_RATIO * before
             // The check with nominal values identifies the drive.
             && (beside.is_empty() || !matches!(suspect, WiringFault::Reversed(_)))
         {
@@ -247,7 +242,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         usize::try_from(all.div_ceil(AFFORDABLE).max(1)).unwrap_or(usize::MAX)
     };
     // A change is judged with several rows for each base parameter.
-    let fewest = (ROWS_PER_COLUMN * model.base.len()).max(1);
+    let fewest = (CORRECTION_ROWS_PER_COLUMN * model.base.len()).max(1);
     let most = (samples.len() * forces.len() / fewest).max(1);
     if thinned(hypotheses.len()) > most {
         // Exchanges are last in the list and most numerous.
@@ -259,7 +254,9 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
     let measured = interleave_forces(forces, &samples);
     // The error without a change is the reference; it does not exist if poses cannot be reached.
     let now = force_audit(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
-    let limit = now.map_or(CONVINCING, |error| BETTER * error);
+    let limit = now.map_or(UNREACHABLE_MOST_ERROR, |error| {
+        CORRECTION_MOST_RATIO * error
+    });
     // Only changes that reduce the error clearly are kept, the best first.
     let mut tried: Vec<(&ColumnHypothesis, f64)> = hypotheses
         .iter()
@@ -274,9 +271,9 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         return Vec::new();
     };
     // Several coordinates may explain the forces equally well by their sign.
-    let alike = tried
-        .iter()
-        .filter(|(one, other)| one.kind == WRONG_SIGN && *other <= (1.0 + ALIKE) * error + EXACT);
+    let alike = tried.iter().filter(|(one, other)| {
+        one.kind == WRONG_SIGN && *other <= (1.0 + SAME_ERROR_TOLERANCE) * error + EXACT
+    });
     let turned: Vec<&str> = alike
         .flat_map(|(one, _)| one.at.iter().map(String::as_str))
         .collect();

@@ -7,17 +7,8 @@ use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_spec::{Mechanism, ModelDrive};
 
+use super::thresholds::{GEAR_RATIOS, NOMINAL_FORCE_FACTOR, NOMINAL_LEAST_CORRELATION};
 use super::{AuditFinding, UNITS, WRONG_SIGN};
-
-/// Below this correlation with the nominal forces nothing is reported: friction and wrong nominal values may be the
-/// cause.
-const CLEAR: f64 = 0.8;
-/// Units of force differ by powers of 1000; nominal values may be wrong by this factor.
-const TOLERANCE: f64 = 4.0;
-
-/// Ratios of nominal to measured force that may be those of a gear: motor torques before the gear. At smaller ratios
-/// nominal values may be wrong.
-const GEARS: std::ops::Range<f64> = 12.0..1000.0 / TOLERANCE;
 
 /// A mistake in a column of forces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,16 +41,18 @@ fn correlation_and_ratio(one: &[f64], other: &[f64]) -> (f64, f64) {
 /// unrelated.
 fn oddity(measured: &[f64], nominal: &[f64]) -> Option<ForceOddity> {
     let (correlation, ratio) = correlation_and_ratio(measured, nominal);
-    if !correlation.is_finite() || correlation.abs() < CLEAR {
+    if !correlation.is_finite() || correlation.abs() < NOMINAL_LEAST_CORRELATION {
         return None;
     }
     // Units are tested first: their ratios are far from those of gears and wrong nominal values.
-    let about = |factor: f64| (factor / TOLERANCE..factor * TOLERANCE).contains(&ratio);
+    let about = |factor: f64| {
+        (factor / NOMINAL_FORCE_FACTOR..factor * NOMINAL_FORCE_FACTOR).contains(&ratio)
+    };
     if about(1e-3) {
         Some(ForceOddity::Misread(ForceMisreading::TooSmall))
     } else if about(1e3) {
         Some(ForceOddity::Misread(ForceMisreading::TooLarge))
-    } else if GEARS.contains(&ratio.recip()) {
+    } else if GEAR_RATIOS.contains(&ratio.recip()) {
         Some(ForceOddity::BeforeGear(correlation.signum() / ratio))
     } else if correlation < 0.0 && about(1.0) {
         Some(ForceOddity::Misread(ForceMisreading::Turned))
@@ -116,7 +109,9 @@ pub(crate) fn oddities(
 fn is_sign_explained(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
     let pairs = measured.iter().zip(forces);
     let alike = pairs.map(|(measured, forces)| correlation_and_ratio(measured, forces).0);
-    let clear: Vec<f64> = alike.filter(|alike| alike.abs() > CLEAR).collect();
+    let clear: Vec<f64> = alike
+        .filter(|alike| alike.abs() > NOMINAL_LEAST_CORRELATION)
+        .collect();
     !clear.is_empty() && clear.iter().all(|alike| *alike > 0.0)
 }
 

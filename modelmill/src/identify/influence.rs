@@ -6,6 +6,7 @@ use modelmill_identify::{ParameterInfo, RecordingNote};
 use super::options::EstimatorOptions;
 use super::regression::{self, RegressionEstimate};
 use super::standstill;
+use super::thresholds::FAULT_INFLUENCE_LEAST_SIGMAS;
 use crate::model::Model;
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
@@ -56,7 +57,7 @@ pub(super) fn fault_influence(
     let deviations = (faulty - sound).abs() / std;
     let files = files.join(", ");
     // A change below one standard deviation needs no name.
-    let says = if deviations < 1.0 {
+    let says = if deviations < FAULT_INFLUENCE_LEAST_SIGMAS {
         format!(
             "Without their repair, the sensor faults in {files} would have changed no base parameter by more than {} standard \
              deviations.",

@@ -6,6 +6,10 @@ use modelmill_identify::sample_place_word;
 
 use crate::error::{Error, Outcome};
 use crate::identify::options::{EquationWeights, EstimatorOptions};
+use crate::identify::thresholds::{
+    INSTRUMENT_FEWEST_PERIODS, INSTRUMENT_PERIOD_FEWEST_STEPS, INSTRUMENT_PERIOD_TOLERANCE_STEPS,
+    INSTRUMENT_TIME_TOLERANCE_STEPS,
+};
 use crate::recording::PreparedRecording;
 use crate::stretch::RecordingSegment;
 
@@ -82,7 +86,7 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
         let apart = a
             .iter()
             .zip(b)
-            .position(|(x, y)| (x - y).abs() > 0.01 * step);
+            .position(|(x, y)| (x - y).abs() > INSTRUMENT_TIME_TOLERANCE_STEPS * step);
         if let Some(sample) = apart {
             return Err(Error::input(format!(
                 "{}, {} {}: t = {} s, but t = {} s in the recording {}; instruments must have the same times",
@@ -120,7 +124,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
         .zip(time.first())
         .map_or(0.0, |(last, first)| last - first);
     let step = span / n.saturating_sub(1).max(1) as f64;
-    if span < 1.5 * period || period < 2.0 * step {
+    if span < INSTRUMENT_FEWEST_PERIODS * period || period < INSTRUMENT_PERIOD_FEWEST_STEPS * step {
         return Err(Error::input(format!(
             "{}: the recording lasts {span:.3} s, which is not one and a half periods of {period} s; instruments from \
              another period need two of them",
@@ -145,7 +149,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
             t - period
         };
         let at = nearest(wanted);
-        if (time[at] - wanted).abs() > 0.75 * step {
+        if (time[at] - wanted).abs() > INSTRUMENT_PERIOD_TOLERANCE_STEPS * step {
             return Err(Error::input(format!(
                 "{}: there is no sample one period of {period} s away from t = {t} s; check the recording for gaps",
                 data.run.file

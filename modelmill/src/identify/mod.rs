@@ -6,6 +6,7 @@ mod options;
 mod refine;
 pub mod regression;
 mod standstill;
+mod thresholds;
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
@@ -30,9 +31,7 @@ pub use modelmill_identify::estimate::HUBER_BOUND;
 pub use options::{EquationWeights, EstimatorOptions};
 pub use refine::{EstimateRefinement, RefinementResult};
 use regression::{InstrumentStatistics, RegressionEstimate};
-
-/// Instruments are weak if their smallest canonical correlation with the regressor is below this value.
-const WEAK_INSTRUMENTS: f64 = 0.2;
+use thresholds::{IMPOSSIBLE_SIGN_SIGMAS, WEAK_INSTRUMENT_CORRELATION};
 
 /// A fit, with the figures of the nominal parameters on the same recordings.
 pub struct Identification {
@@ -269,7 +268,7 @@ fn remarks(
     let unknown: Vec<&FitParameter> = found.unknown.iter().map(|k| &parameters[*k]).collect();
     let names: Vec<String> = unknown.iter().map(|p| p.expression.clone()).collect();
     if let Some(InstrumentStatistics { strength, .. }) = &found.instruments
-        && *strength < WEAK_INSTRUMENTS
+        && *strength < WEAK_INSTRUMENT_CORRELATION
     {
         notes.push(RecordingNote::warning(format!(
             "The instruments are weak: their smallest correlation with the regressor is {}. Check that they have the same \
@@ -335,7 +334,7 @@ fn remarks(
     // A sign counts as wrong only if it is two standard deviations beyond zero.
     for (k, p) in parameters.iter().enumerate() {
         // Undetermined parameters keep their nominal sign and are not tested.
-        let slack = 2.0 * p.std.unwrap_or(0.0);
+        let slack = IMPOSSIBLE_SIGN_SIGMAS * p.std.unwrap_or(0.0);
         let (wrong, expected) = match model.sign(k) {
             Sign::Positive => (p.value < -slack, "positive"),
             Sign::Negative => (p.value > slack, "negative"),

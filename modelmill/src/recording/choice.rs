@@ -23,6 +23,9 @@ use nalgebra::{DMatrix, DVector};
 use super::free;
 use super::options::RecordingOptions;
 use super::smoother::{SmootherCandidate, floor_to_count, series_up_to};
+use super::thresholds::{
+    SAME_RESIDUAL_TOLERANCE, SMOOTHING_LEAST_GAIN, SMOOTHING_ROWS_PER_COLUMN, WINDOW_FEWEST_SAMPLES,
+};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::text::table::{percent, significant};
@@ -54,12 +57,8 @@ const DROPPED: (f64, f64) = (1.5, 0.2);
 const PARALLEL: [f64; 3] = [0.5, 1.0, 2.0];
 /// Samples next to a window, at the rate of the evaluation, beyond which the low-pass has no influence.
 const BEYOND: usize = 60;
-/// Smallest number of samples of a window.
-const FEWEST: usize = 40;
 /// A residual below this fraction of the force is rounding.
 const ROUNDING: f64 = 1e-6;
-/// A candidate must be better by this fraction of the error to be preferred to one that smooths more.
-const BETTER: f64 = 0.005;
 /// A cut-off whose residual exceeds the smallest by this factor ends the search downwards.
 const HOPELESS: f64 = 1.5;
 
@@ -124,7 +123,7 @@ impl SmootherTrials {
 /// The change of the residual in per cent, from the difference of two figures.
 fn cost_text(difference: f64) -> String {
     let more = difference.exp() - 1.0;
-    if more.abs() < 1e-3 {
+    if more.abs() < SAME_RESIDUAL_TOLERANCE {
         "as much".to_owned()
     } else if more < 0.0 {
         format!("{} less", percent(Some(-more)))
@@ -178,8 +177,9 @@ impl SmootherSearch<'_> {
         });
         let (low_pass, by_filter) = filtered.best();
         // A series must be clearly better than the low-pass to be preferred.
-        let is_better =
-            |series: &SmootherTrials| series.best().1.figure < by_filter.figure - BETTER;
+        let is_better = |series: &SmootherTrials| {
+            series.best().1.figure < by_filter.figure - SMOOTHING_LEAST_GAIN
+        };
         let (tried, other) = match series {
             Some(series) if is_better(&series) => {
                 let more = cost_text(by_filter.figure - series.best().1.figure);
@@ -253,8 +253,9 @@ impl SmootherSearch<'_> {
             }
         }
         // Of all that are nearly as good, the last one smooths most.
-        let is_good =
-            |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + BETTER;
+        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| {
+            left.figure <= least + SMOOTHING_LEAST_GAIN
+        };
         let best = all.iter().rposition(is_good)?;
         Some(SmootherTrials { all, best })
     }
@@ -272,7 +273,7 @@ impl SmootherSearch<'_> {
             let factor = floor_to_count(DECIMATION_PASSBAND * self.open.rate_hz / passed).max(1);
             let passed = if factor == 1 { f64::INFINITY } else { passed };
             let left = self.held_out_residual(smoother, passed, looked_at)?;
-            if best.is_none_or(|(_, least)| left.figure < least.figure - BETTER) {
+            if best.is_none_or(|(_, least)| left.figure < least.figure - SMOOTHING_LEAST_GAIN) {
                 best = Some((factor, left));
             }
             if factor == 1 {
@@ -460,7 +461,7 @@ impl SmootherSearch<'_> {
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
         let samples: Vec<usize> = (start..end).step_by(every).collect();
-        if samples.len() < FEWEST {
+        if samples.len() < WINDOW_FEWEST_SAMPLES {
             return None;
         }
         let regressor = self.regressor(run, &samples)?;
@@ -660,7 +661,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
     let total = |d: usize| -> f64 { folds.iter().map(|fold| fold.drives[d].size).sum() };
     let sizes: Vec<f64> = (0..n).map(total).collect();
     let rows: usize = folds.iter().map(|fold| fold.drives[0].rows).sum();
-    if rows * n < 3 * width || sizes.iter().any(|size| *size <= 0.0) {
+    if rows * n < SMOOTHING_ROWS_PER_COLUMN * width || sizes.iter().any(|size| *size <= 0.0) {
         return None;
     }
     // All drives have equal relative weights first, then weights from their residuals.

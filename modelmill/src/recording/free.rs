@@ -6,11 +6,9 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::{PreparedRun, RecordingNote, SignalRecording as Raw, StatePreparation};
 use modelmill_spec::{DriveKind, FrameStep, FreeBody, Kinematics, Mechanism, TwistAxes};
 
+use super::thresholds::QUATERNION_LENGTH_TOLERANCE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-
-/// Tolerance for the length of a recorded quaternion: a larger difference is not rounding, but another column.
-const UNIT: f64 = 0.02;
 
 /// The free bodies of a mechanism.
 pub(crate) fn free_bodies(mechanism: &Mechanism) -> impl Iterator<Item = &FreeBody> {
@@ -121,7 +119,7 @@ fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
         let here: [f64; 4] = std::array::from_fn(|k| columns[k][sample]);
         // A length far from one is a wrong column, no rounding.
         let length = here.iter().map(|x| x * x).sum::<f64>().sqrt();
-        if (length - 1.0).abs() > UNIT {
+        if (length - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
             let line = raw.line(sample).unwrap_or(0);
             return Err(Error::input(message!(
                 "{}: the quaternion `{}` in line {line} has the length {length:.4}, and that of a unit quaternion is 1; check \

@@ -3,12 +3,11 @@
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::SignalRecording as Raw;
 
+use super::thresholds::LEVERAGE_PEAK_RATIO;
 use crate::model::Model;
 
 /// Number of samples to either side with which a pose is compared.
 const BESIDE: usize = 10;
-/// A peak is assumed where a drive needs this many times the force that it needs at the samples around.
-const PEAK: f64 = 3.0;
 
 /// The drives of a mechanism with loops along the positions of a recording, before preparation.
 pub(super) struct DriveLeverage<'a> {
@@ -46,7 +45,7 @@ impl<'a> DriveLeverage<'a> {
         // The comparison uses the two ends of the range around the sample.
         let around = [from, until - 1].map(|i| self.force_demand(drive, i));
         let least = around.into_iter().flatten().fold(f64::INFINITY, f64::min);
-        here > PEAK * least
+        here > LEVERAGE_PEAK_RATIO * least
     }
 
     /// The norm of a drive's row of H if all coordinates accelerate by one from standstill; `None` at singular poses.

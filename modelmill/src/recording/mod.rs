@@ -8,6 +8,7 @@ pub(crate) mod free;
 mod leverage;
 mod options;
 mod smoother;
+mod thresholds;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -12,6 +12,7 @@ use crate::audit::events::ContactEvent;
 use crate::model::Model;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::{PayloadColumns, TEN};
+use crate::runs::thresholds::{KNOWN_VALUE_SIGMAS, SCALE_CHANGE_RARITY};
 use crate::text::table::{significant, with_deviation};
 
 /// An estimated value with its standard deviation.
@@ -34,7 +35,7 @@ impl ChangeEstimate {
 
     /// Whether its standard deviation is below a third of its size.
     fn is_known(self) -> bool {
-        3.0 * self.deviation < self.value.abs()
+        KNOWN_VALUE_SIGMAS * self.deviation < self.value.abs()
     }
 }
 
@@ -189,10 +190,6 @@ pub(crate) struct ChangeHypothesis {
     pub(crate) candidate: PossibleChange,
 }
 
-/// Additional cost of a changed scale, since friction changes every day, but sensors, torque constants and gears
-/// hardly ever. It decides if both explain the same, as at a drive whose only force is its own friction.
-const RARE: f64 = 0.2;
-
 /// All hypotheses of the search: payloads, then friction, offset and scale of each drive, clock, zeros of encoders.
 pub(crate) fn possible_changes(
     model: &Model,
@@ -203,7 +200,7 @@ pub(crate) fn possible_changes(
         let (most, rarity) = match kind {
             // Dry and viscous friction usually change together, so that they cost as much as one value.
             ChangeKind::Friction(_) => (1, 0.0),
-            ChangeKind::Scale(_) => (1, RARE),
+            ChangeKind::Scale(_) => (1, SCALE_CHANGE_RARITY),
             _ => (columns.len(), 0.0),
         };
         ChangeHypothesis {

@@ -14,6 +14,7 @@ mod per_run;
 mod points;
 mod rows;
 mod sums;
+mod thresholds;
 
 use std::borrow::Borrow;
 
@@ -39,19 +40,9 @@ pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-
-/// A base parameter has changed if its difference exceeds this many standard deviations.
-const MOVED: f64 = 4.0;
-
-/// A change must move one of the drives by this fraction of its rms force: smaller changes are within the errors of
-/// any model.
-const LEAST: f64 = 4e-3;
-
-/// Shorter events, in s, are excluded but not reported as pushes: model errors can rise for so long as well.
-const SHORTEST_PUSH: f64 = 0.25;
-
-/// This fraction of an event's length is excluded before and after it as well.
-const AROUND: f64 = 0.2;
+use thresholds::{
+    CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
+};
 
 /// A fitted value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -299,7 +290,7 @@ fn merged_contact_events(
             continue;
         }
         match all.last_mut() {
-            Some(last) if from - last.to < SHORTEST_PUSH => {
+            Some(last) if from - last.to < SHORTEST_PUSH_S => {
                 last.to = to;
                 for (d, largest, usual) in event.drives {
                     match last.drives.iter_mut().find(|(other, ..)| *other == d) {
@@ -361,7 +352,7 @@ impl<'a> RunAnalyser<'a> {
             let found = merged_contact_events(found, stretch);
             // The start and the end of a push hardly exceed the usual residual, so that its interval is widened.
             let wide = found.iter().map(|event| {
-                let room = AROUND * (event.to - event.from);
+                let room = PUSH_MARGIN_SHARE * (event.to - event.from);
                 ContactEvent {
                     from: event.from - room,
                     to: event.to + room,
@@ -372,7 +363,7 @@ impl<'a> RunAnalyser<'a> {
             // Short events are excluded, but not reported.
             let lasting = found
                 .iter()
-                .filter(|event| event.to - event.from >= SHORTEST_PUSH);
+                .filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
         let rows = RunRows::new(self.model, &stretches, self.payloads, values)?;
@@ -401,7 +392,8 @@ impl<'a> RunAnalyser<'a> {
         // Only parameters that both runs determine can be compared.
         let differs = |(a, b): (&FittedValue, &FittedValue)| {
             let is_known = a.deviation.is_some() && b.deviation.is_some();
-            is_known && (a.value - b.value).abs() > MOVED * a.difference_deviation(*b)
+            is_known
+                && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * a.difference_deviation(*b)
         };
         let pairs = alone.iter().zip(&reference).map(differs);
         let moved = pairs
@@ -437,7 +429,7 @@ impl<'a> RunAnalyser<'a> {
         let mut found = search_changes(runs, &self.search);
         found.retain(|one| {
             let columns = &self.possible[one.candidate].candidate.columns;
-            sizes.force_fraction(columns, &one.values) > LEAST
+            sizes.force_fraction(columns, &one.values) > CHANGE_LEAST_FORCE_SHARE
         });
         found
     }

@@ -7,6 +7,7 @@ use modelmill_identify::changes::{
 use nalgebra::DVector;
 
 use crate::runs::rows::MeasuredMoments;
+use crate::runs::thresholds::CHANGE_POINT_RUNS;
 use crate::runs::{FittedValue, RunAnalyser, RunChange};
 
 /// A permanent change of one parameter.
@@ -86,7 +87,9 @@ pub(crate) fn find_change_points(
     // Stage 3: the sums before and after each point are searched for physical changes.
     let point = |three: &[usize]| {
         let (start, at, end) = (three[0], three[1], three[2]);
-        let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= 1);
+        let own = steps
+            .iter()
+            .filter(|(run, _)| run.abs_diff(at) <= CHANGE_POINT_RUNS);
         let mut own: Vec<ParameterStep> = own.map(|(_, step)| *step).collect();
         own.sort_by(|a, b| b.deviations().total_cmp(&a.deviations()));
         let both = RunPair {
@@ -122,7 +125,10 @@ fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     weights.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<usize> = Vec::new();
     for (run, _) in weights {
-        if kept.iter().all(|other| other.abs_diff(run) > 1) {
+        if kept
+            .iter()
+            .all(|other| other.abs_diff(run) > CHANGE_POINT_RUNS)
+        {
             kept.push(run);
         }
     }

@@ -12,14 +12,13 @@ use crate::model::Model;
 use crate::runs::columns::SegmentRows;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
+use crate::runs::thresholds::NOISE_FLOOR_SHARE;
 use crate::stretch::RecordingSegment;
 
 /// Number of blocks of a run for cross-validation.
 pub(crate) const BLOCKS: usize = 8;
 /// Number of iterations of the weights from residuals.
 const ROUNDS: usize = 2;
-/// Assumed additional noise of every run, relative to a drive's rms force: no model is more accurate.
-const FLOOR: f64 = 1e-3;
 /// Largest number of samples of a piece, after decimation.
 const PIECE: usize = 4096;
 /// Runs of up to this many pieces keep their columns; longer ones compute them again in each pass.
@@ -170,7 +169,10 @@ impl<'a> RunRows<'a> {
         // Stage 2: an autoregressive model of each drive's residual.
         let noise = |(rests, sums): (&Vec<Vec<f64>>, &NormalEquations)| {
             let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
-            AutoregressiveNoise::from_residual(&rests, FLOOR * effective_value(sums, sums.total))
+            AutoregressiveNoise::from_residual(
+                &rests,
+                NOISE_FLOOR_SHARE * effective_value(sums, sums.total),
+            )
         };
         let noise: Vec<AutoregressiveNoise> = rests.iter().zip(&self.sums).map(noise).collect();
         let length: usize = (self.pieces.iter())

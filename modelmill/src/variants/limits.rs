@@ -2,13 +2,11 @@
 
 use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant, LimitMargin};
 
+use super::thresholds::LIMIT_TOLERANCE;
 use crate::error::{Error, Outcome};
 use crate::excite::plant::{AXES, ModelPlant, used_fraction};
 use crate::model::Model;
 use crate::stretch::{BLOCK, RecordingSegment};
-
-/// A limit counts as exceeded only by more than this fraction, which is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// The state of a limit in two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +39,7 @@ impl LimitUse {
     pub fn crossing(&self) -> LimitCrossing {
         let is_beyond = self
             .used
-            .map(|used| used.is_some_and(|used| used > 1.0 + ROUNDING));
+            .map(|used| used.is_some_and(|used| used > 1.0 + LIMIT_TOLERANCE));
         match is_beyond {
             [false, true] => LimitCrossing::NowExceeded,
             [true, true] => LimitCrossing::StillExceeded,

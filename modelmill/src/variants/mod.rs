@@ -5,6 +5,7 @@ mod counterparts;
 mod effort;
 mod limits;
 mod terms;
+mod thresholds;
 
 use modelmill_boundary::message;
 use modelmill_identify::{ErrorFigures, RecordingNote};
@@ -19,13 +20,11 @@ use crate::stretch::RecordingSegment;
 use counterparts::ModelCounterparts;
 use effort::EffortSums;
 use terms::SummandColumns;
+use thresholds::FORCE_DIFFERENCE_LEAST_SHARE;
 
 pub use effort::DriveEffort;
 pub use limits::{LimitCrossing, LimitUse};
 pub use terms::{ProductShare, TermShare};
-
-/// A difference of forces below this fraction of them is rounding and has no cause.
-const ROUNDING: f64 = 1e-8;
 
 /// The comparison of two models of one machine along the same motions.
 #[derive(Clone, Debug)]
@@ -152,7 +151,7 @@ impl VariantComparison {
             let [before, after] = gathered[k].map(EffortSums::effort);
             let (peak, squares) = differences[k];
             let rms = (squares / samples.max(1) as f64).sqrt();
-            let is_rounding = rms <= ROUNDING * before.rms.max(after.rms);
+            let is_rounding = rms <= FORCE_DIFFERENCE_LEAST_SHARE * before.rms.max(after.rms);
             DriveVariants {
                 drive: models[0].derivation.mechanism.drives[*d].name.clone(),
                 unit: models[0].force_unit(*d),

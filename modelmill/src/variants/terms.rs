@@ -13,12 +13,10 @@ use std::collections::BTreeMap;
 
 use modelmill_codegen::{ModelEvaluator, PoseFault, review};
 
+use super::thresholds::CAUSE_LEAST_SHARE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::stretch::RecordingSegment;
-
-/// Shares below this one are rounding and are left out.
-const ROUNDING: f64 = 1e-12;
 
 /// The share of a product of parameters in a difference of forces, over all base parameters that contain it. Unlike
 /// the share of a single summand, it does not depend on which columns are retained.
@@ -180,7 +178,7 @@ impl SummandColumns {
                 // A summand of one model only has one column.
                 _ => share,
             };
-            if share.abs() < ROUNDING && by_value.abs() < ROUNDING {
+            if share.abs() < CAUSE_LEAST_SHARE && by_value.abs() < CAUSE_LEAST_SHARE {
                 continue;
             }
             let term = TermShare {
