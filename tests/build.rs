@@ -109,16 +109,13 @@ fn asked_models() -> String {
 /// Takes the last term off the first base parameter that is a sum.
 fn without_a_term(derivation: &mut Derivation) {
     let dependencies = &mut derivation.reduction.dependencies;
-    let line = dependencies
-        .iter_mut()
-        .rfind(|line| !line.equals.is_empty());
+    let line = dependencies.iter_mut().rfind(|line| !line.equals.is_empty());
     let line = line.expect("a base parameter that is a sum");
     line.equals.pop();
 }
 
 fn derived(mechanism: &Mechanism) -> Derivation {
-    modelmill_codegen::derive(mechanism)
-        .unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
+    modelmill_codegen::derive(mechanism).unwrap_or_else(|error| panic!("{}: {error}", mechanism.name))
 }
 
 fn module(mechanism: &Mechanism) -> String {

@@ -88,9 +88,7 @@ impl BigFloat {
         // The standard library prints the shortest decimal that is read as the same double.
         let text = value.is_finite().then(|| format!("{value:e}"))?;
         let (mantissa, exponent) = text.split_once('e')?;
-        let n_places = mantissa
-            .split_once('.')
-            .map_or(0, |(_, places)| places.len());
+        let n_places = mantissa.split_once('.').map_or(0, |(_, places)| places.len());
         let whole: BigInt = mantissa.replace('.', "").parse().ok()?;
         let exponent: i64 = exponent.parse::<i64>().ok()? - i64::try_from(n_places).ok()?;
         let power = BigInt::from(10).pow(u32::try_from(exponent.unsigned_abs()).ok()?);
@@ -139,11 +137,7 @@ impl BigFloat {
     /// Its magnitude.
     #[must_use]
     pub fn abs(&self) -> Self {
-        if self.is_negative() {
-            -self
-        } else {
-            self.clone()
-        }
+        if self.is_negative() { -self } else { self.clone() }
     }
 
     /// `self * 2^n`
@@ -342,9 +336,7 @@ impl Add for &BigFloat {
             (other, self)
         };
         // Digits below the last bit of the larger number have no effect.
-        if high.binary_magnitude() - low.binary_magnitude()
-            > i64::try_from(BITS + GUARD_BITS).expect("some bits")
-        {
+        if high.binary_magnitude() - low.binary_magnitude() > i64::try_from(BITS + GUARD_BITS).expect("some bits") {
             return high.clone();
         }
         // Both mantissas in units of the smaller exponent.
@@ -373,10 +365,7 @@ impl Sub for &BigFloat {
 impl Mul for &BigFloat {
     type Output = BigFloat;
     fn mul(self, other: &BigFloat) -> BigFloat {
-        BigFloat::new(
-            &self.mantissa * &other.mantissa,
-            self.exponent + other.exponent,
-        )
+        BigFloat::new(&self.mantissa * &other.mantissa, self.exponent + other.exponent)
     }
 }
 
@@ -424,10 +413,7 @@ mod tests {
             same(&(&(&c * &c) + &(&s * &s)), &BigFloat::integer(1));
             assert!((s.to_f64() - x.to_f64().sin()).abs() < 1e-14);
             assert!((c.to_f64() - x.to_f64().cos()).abs() < 1e-14);
-            same(
-                &(&x.exp().unwrap() * &(-&x).exp().unwrap()),
-                &BigFloat::integer(1),
-            );
+            same(&(&x.exp().unwrap() * &(-&x).exp().unwrap()), &BigFloat::integer(1));
             assert!((x.tanh().unwrap().to_f64() - x.to_f64().tanh()).abs() < 1e-15);
             let root = x.abs().sqrt().unwrap();
             same(&(&root * &root), &x.abs());

@@ -32,12 +32,7 @@ impl<const P: u64> RowEchelonForm<P> {
             .filter(|(factor, _)| *factor != FieldElement::ZERO)
             .collect();
         FieldElement::add_multiples(&mut row, &multiples);
-        let Some(pivot) = self
-            .order
-            .iter()
-            .copied()
-            .find(|c| row[*c] != FieldElement::ZERO)
-        else {
+        let Some(pivot) = self.order.iter().copied().find(|c| row[*c] != FieldElement::ZERO) else {
             return false;
         };
         // The new row is scaled, and its pivot is eliminated from the known rows.
@@ -56,9 +51,7 @@ impl<const P: u64> RowEchelonForm<P> {
 
     /// Whether a column has any entry other than zero. A dependent row cannot be the first with such an entry.
     pub fn has_nonzero_value(&self, column: usize) -> bool {
-        self.rows
-            .iter()
-            .any(|row| row[column] != FieldElement::ZERO)
+        self.rows.iter().any(|row| row[column] != FieldElement::ZERO)
     }
 
     /// The entry of a column in the row of a pivot; `None` if `pivot` is no pivot column.
@@ -69,11 +62,7 @@ impl<const P: u64> RowEchelonForm<P> {
 }
 
 /// Adds `factor * other` to a row.
-fn add_multiple<const P: u64>(
-    row: &mut [FieldElement<P>],
-    factor: FieldElement<P>,
-    other: &[FieldElement<P>],
-) {
+fn add_multiple<const P: u64>(row: &mut [FieldElement<P>], factor: FieldElement<P>, other: &[FieldElement<P>]) {
     if factor == FieldElement::ZERO {
         return;
     }
@@ -85,10 +74,7 @@ fn add_multiple<const P: u64>(
 }
 
 /// A basis of the solutions of `rows * x = 0`, one vector per column without pivot.
-pub fn null_space<const P: u64>(
-    rows: Vec<Vec<FieldElement<P>>>,
-    n_columns: usize,
-) -> Vec<Vec<FieldElement<P>>> {
+pub fn null_space<const P: u64>(rows: Vec<Vec<FieldElement<P>>>, n_columns: usize) -> Vec<Vec<FieldElement<P>>> {
     let order: Vec<usize> = (0..n_columns).collect();
     let mut echelon = RowEchelonForm::new(&order);
     for row in rows {

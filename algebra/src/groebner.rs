@@ -156,23 +156,12 @@ fn is_redundant_pair(
 }
 
 /// Removes members whose leading terms are divisible by others', and reduces the remaining ones by each other.
-fn reduce_basis(
-    mut basis: Vec<Polynomial>,
-    work: &mut GroebnerWork,
-) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
-    basis.sort_by(|a, b| {
-        a.leading_term()
-            .map(|l| l.0)
-            .cmp(&b.leading_term().map(|l| l.0))
-    });
+fn reduce_basis(mut basis: Vec<Polynomial>, work: &mut GroebnerWork) -> Result<Vec<Polynomial>, GroebnerLimitExceeded> {
+    basis.sort_by(|a, b| a.leading_term().map(|l| l.0).cmp(&b.leading_term().map(|l| l.0)));
     let mut kept: Vec<Polynomial> = Vec::new();
     for member in basis {
         let leading = member.leading_term().expect("members are not zero").0;
-        let divides = |g: &Polynomial| {
-            leading
-                .quotient(g.leading_term().expect("not zero").0)
-                .is_some()
-        };
+        let divides = |g: &Polynomial| leading.quotient(g.leading_term().expect("not zero").0).is_some();
         if !kept.iter().any(divides) {
             kept.push(member);
         }
@@ -190,9 +179,9 @@ fn reduce_basis(
 
 /// Whether a basis shows that there are no solutions, not even complex ones.
 pub fn has_no_solution(basis: &[Polynomial]) -> bool {
-    basis.first().is_some_and(|p| {
-        p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one())
-    })
+    basis
+        .first()
+        .is_some_and(|p| p.degree() == 0 && p.leading_term().is_some_and(|(_, factor)| factor.is_one()))
 }
 
 /// The terms that no leading term divides, in ascending order; `None` if they are infinitely many, because solutions
@@ -205,10 +194,7 @@ pub fn standard_terms(
     n: usize,
     most: usize,
 ) -> Result<Option<Vec<TermExponents>>, GroebnerLimitExceeded> {
-    let leading: Vec<&TermExponents> = basis
-        .iter()
-        .filter_map(|g| Some(g.leading_term()?.0))
-        .collect();
+    let leading: Vec<&TermExponents> = basis.iter().filter_map(|g| Some(g.leading_term()?.0)).collect();
     // They are finitely many if a power of every unknown is a leading term.
     let is_bounded = |i: usize| leading.iter().any(|term| term.degree() == term.0[i]);
     if !(0..n).all(is_bounded) {

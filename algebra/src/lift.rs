@@ -44,10 +44,7 @@ pub fn reconstruct_rational(residues: &[(u64, u64)]) -> Option<Rational> {
     } else {
         BigInt::one()
     };
-    Some(Rational::from(BigRational::new(
-        sign * numerator,
-        denominator.abs(),
-    )))
+    Some(Rational::from(BigRational::new(sign * numerator, denominator.abs())))
 }
 
 /// Product of the primes, and the number below it that has all the residues (Chinese remainder theorem).

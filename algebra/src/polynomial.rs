@@ -37,22 +37,13 @@ impl TermExponents {
     /// `self / divisor`, if it is a term.
     pub fn quotient(&self, divisor: &Self) -> Option<Self> {
         let pairs = self.0.iter().zip(&divisor.0);
-        pairs
-            .map(|(a, b)| a.checked_sub(*b))
-            .collect::<Option<_>>()
-            .map(Self)
+        pairs.map(|(a, b)| a.checked_sub(*b)).collect::<Option<_>>().map(Self)
     }
 
     /// The least term that both divide.
     #[must_use]
     pub fn least_common_multiple(&self, other: &Self) -> Self {
-        Self(
-            self.0
-                .iter()
-                .zip(&other.0)
-                .map(|(a, b)| *a.max(b))
-                .collect(),
-        )
+        Self(self.0.iter().zip(&other.0).map(|(a, b)| *a.max(b)).collect())
     }
 }
 
@@ -209,9 +200,7 @@ pub fn exact_decimal(value: f64) -> BigRational {
     let text = format!("{value:e}");
     let (digits, exponent) = text.split_once('e').expect("an exponent is printed");
     let exponent: i32 = exponent.parse().expect("a small exponent");
-    let decimals = digits
-        .split_once('.')
-        .map_or(0, |(_, decimals)| decimals.len());
+    let decimals = digits.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     let digits: num_bigint::BigInt = digits.replace('.', "").parse().expect("digits");
     let power = exponent - i32::try_from(decimals).expect("at most 17 decimals");
     let ten = num_bigint::BigInt::from(10).pow(power.unsigned_abs());
@@ -240,21 +229,12 @@ mod tests {
 
     #[test]
     fn decimals_are_taken_as_they_are_printed() {
-        assert_eq!(
-            exact_decimal(1.13),
-            BigRational::new(113.into(), 100.into())
-        );
-        assert_eq!(
-            exact_decimal(-2.5e-7),
-            BigRational::new((-1).into(), 4_000_000.into())
-        );
+        assert_eq!(exact_decimal(1.13), BigRational::new(113.into(), 100.into()));
+        assert_eq!(exact_decimal(-2.5e-7), BigRational::new((-1).into(), 4_000_000.into()));
         assert_eq!(
             exact_decimal(3e20),
             BigRational::from_integer(300_000_000_000_000_000_000_i128.into())
         );
-        assert_eq!(
-            nearest_f64(&exact_decimal(0.1)).to_bits(),
-            0.1_f64.to_bits()
-        );
+        assert_eq!(nearest_f64(&exact_decimal(0.1)).to_bits(), 0.1_f64.to_bits());
     }
 }

@@ -66,10 +66,7 @@ impl Rational {
         // Numbers that do not fit into words become big integers.
         match (i64::try_from(n), i64::try_from(d)) {
             (Ok(n), Ok(d)) => Self(RationalRepr::Small(sign * n, d)),
-            _ => Self::from(BigRational::new(
-                BigInt::from(numerator),
-                BigInt::from(denominator),
-            )),
+            _ => Self::from(BigRational::new(BigInt::from(numerator), BigInt::from(denominator))),
         }
     }
 
@@ -84,10 +81,7 @@ impl Rational {
             (common, rest) = (rest, common % rest);
         }
         let common = if denominator < 0 { -common } else { common };
-        Self(RationalRepr::Small(
-            numerator / common,
-            denominator / common,
-        ))
+        Self(RationalRepr::Small(numerator / common, denominator / common))
     }
 
     /// The same number as a fraction of big integers, in lowest terms.
@@ -135,11 +129,7 @@ impl Rational {
     /// Absolute value.
     #[must_use]
     pub fn abs(&self) -> Self {
-        if self.is_negative() {
-            -self
-        } else {
-            self.clone()
-        }
+        if self.is_negative() { -self } else { self.clone() }
     }
 
     /// One over it; it must not be zero.
@@ -158,11 +148,7 @@ impl Rational {
             return self.clone();
         }
         // A negative exponent inverts the number first.
-        let base = if exponent < 0 {
-            self.recip()
-        } else {
-            self.clone()
-        };
+        let base = if exponent < 0 { self.recip() } else { self.clone() };
         (0..exponent.unsigned_abs()).fold(Self::ONE, |product, _| &product * &base)
     }
 
@@ -172,10 +158,7 @@ impl Rational {
         if let (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) = (&self.0, &other.0) {
             // gcd(a/b, c/d) = gcd(a d, c b) / (b d)
             let (b, d) = (u128::from(b.unsigned_abs()), u128::from(d.unsigned_abs()));
-            let n = gcd(
-                u128::from(a.unsigned_abs()) * d,
-                u128::from(c.unsigned_abs()) * b,
-            );
+            let n = gcd(u128::from(a.unsigned_abs()) * d, u128::from(c.unsigned_abs()) * b);
             let m = b * d;
             let common = gcd(n, m).max(1);
             if let (Ok(n), Ok(m)) = (i64::try_from(n / common), i64::try_from(m / common)) {
@@ -239,12 +222,7 @@ impl Add for &Rational {
                 Rational::from_wide(i128::from(*a) + i128::from(*c), 1)
             }
             (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) => {
-                let (a, b, c, d) = (
-                    i128::from(*a),
-                    i128::from(*b),
-                    i128::from(*c),
-                    i128::from(*d),
-                );
+                let (a, b, c, d) = (i128::from(*a), i128::from(*b), i128::from(*c), i128::from(*d));
                 Rational::from_wide(a * d + c * b, b * d)
             }
             _ => Rational::from(self.to_big() + other.to_big()),
@@ -263,10 +241,9 @@ impl Mul for &Rational {
     type Output = Rational;
     fn mul(self, other: Self) -> Rational {
         match (&self.0, &other.0) {
-            (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) => Rational::from_wide(
-                i128::from(*a) * i128::from(*c),
-                i128::from(*b) * i128::from(*d),
-            ),
+            (RationalRepr::Small(a, b), RationalRepr::Small(c, d)) => {
+                Rational::from_wide(i128::from(*a) * i128::from(*c), i128::from(*b) * i128::from(*d))
+            }
             _ => Rational::from(self.to_big() * other.to_big()),
         }
     }

@@ -75,8 +75,7 @@ pub fn isolate_roots(polynomial: &[BigRational]) -> Vec<RationalInterval> {
     let mut open = vec![whole];
     while let Some(interval) = open.pop() {
         // Sturm's theorem: the number of roots in (low, high].
-        let count =
-            sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
+        let count = sign_variations(&chain, &interval.low) - sign_variations(&chain, &interval.high);
         match count {
             // Intervals with several roots are halved until each has one.
             0 => {}
@@ -138,9 +137,7 @@ fn value(polynomial: &[BigRational], x: &BigRational) -> BigRational {
 /// Coefficients of the derivative.
 fn derivative(polynomial: &[BigRational]) -> UnivariatePolynomial {
     let terms = polynomial.iter().enumerate().skip(1);
-    terms
-        .map(|(n, k)| k * BigRational::from_integer(n.into()))
-        .collect()
+    terms.map(|(n, k)| k * BigRational::from_integer(n.into())).collect()
 }
 
 /// The polynomial divided by the magnitude of its leading coefficient, so that remainders stay short; signs are kept.
@@ -154,10 +151,7 @@ fn primitive_part(mut polynomial: UnivariatePolynomial) -> UnivariatePolynomial 
 }
 
 /// Quotient and remainder of a division; the divisor must not be zero.
-fn divide(
-    polynomial: &[BigRational],
-    by: &[BigRational],
-) -> (UnivariatePolynomial, UnivariatePolynomial) {
+fn divide(polynomial: &[BigRational], by: &[BigRational]) -> (UnivariatePolynomial, UnivariatePolynomial) {
     let mut rest = polynomial.to_vec();
     let leading = by.last().expect("no division by zero");
     let steps = (rest.len() + 1).saturating_sub(by.len());

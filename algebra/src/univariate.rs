@@ -63,9 +63,7 @@ fn multiply(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
 /// The difference of two polynomials.
 fn subtract(a: &[FieldElement], b: &[FieldElement]) -> Vec<FieldElement> {
     let at = |p: &[FieldElement], i: usize| p.get(i).copied().unwrap_or(FieldElement::ZERO);
-    (0..a.len().max(b.len()))
-        .map(|i| at(a, i) - at(b, i))
-        .collect()
+    (0..a.len().max(b.len())).map(|i| at(a, i) - at(b, i)).collect()
 }
 
 /// Quotient and remainder; the divisor must be trimmed and not zero.
@@ -123,12 +121,10 @@ mod tests {
     fn degrees_of_a_known_function_are_found() {
         let mut stream = RandomStream::new(3);
         for (a, b) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (3, 2), (0, 3)] {
-            let mut coefficients =
-                |n: usize| (0..=n).map(|_| stream.next_element()).collect::<Vec<_>>();
+            let mut coefficients = |n: usize| (0..=n).map(|_| stream.next_element()).collect::<Vec<_>>();
             let (p, q) = (coefficients(a), coefficients(b));
-            let value = |c: &[FieldElement], x: FieldElement| {
-                c.iter().rev().fold(FieldElement::ZERO, |s, k| s * x + *k)
-            };
+            let value =
+                |c: &[FieldElement], x: FieldElement| c.iter().rev().fold(FieldElement::ZERO, |s, k| s * x + *k);
             let x: Vec<FieldElement> = (0..a + b + 4).map(|_| stream.next_element()).collect();
             let y: Vec<FieldElement> = x
                 .iter()

@@ -127,8 +127,7 @@ pub fn try_generate_with(pattern: &str, options: Options, out: &Path) -> Result<
     if std::fs::read_to_string(out).is_ok_and(|old| old == text) {
         return Ok(());
     }
-    modelmill_boundary::files::write(out, text.as_bytes())
-        .map_err(|error| BuildError(format!("cannot write {error}")))
+    modelmill_boundary::files::write(out, text.as_bytes()).map_err(|error| BuildError(format!("cannot write {error}")))
 }
 
 fn matching_model_files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
@@ -136,17 +135,15 @@ fn matching_model_files(pattern: &str) -> Result<Vec<PathBuf>, BuildError> {
         return Ok(vec![PathBuf::from(pattern)]);
     };
     println!("cargo::rerun-if-changed={folder}");
-    let entries = std::fs::read_dir(folder)
-        .map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
+    let entries =
+        std::fs::read_dir(folder).map_err(|error| BuildError(format!("cannot read folder `{folder}`: {error}")))?;
     let mut files: Vec<PathBuf> = entries
         .filter_map(|entry| entry.ok().map(|e| e.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "toml"))
         .collect();
     files.sort();
     if files.is_empty() {
-        return Err(BuildError(format!(
-            "no model file `*.toml` in folder `{folder}`"
-        )));
+        return Err(BuildError(format!("no model file `*.toml` in folder `{folder}`")));
     }
     Ok(files)
 }

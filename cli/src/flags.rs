@@ -44,11 +44,7 @@ impl CommandLineSpelling {
                 let _ = write!(compared, " {data}");
             }
             for (ours, theirs) in &reading.columns {
-                let _ = write!(
-                    compared,
-                    " --map {}",
-                    quote_word(&format!("{ours}={theirs}"))
-                );
+                let _ = write!(compared, " --map {}", quote_word(&format!("{ours}={theirs}")));
             }
         }
         // Validation runs follow the fit runs on the command line, but `excite` does not take them.
@@ -271,8 +267,7 @@ mod tests {
     /// Every option and command that the library may advise is a flag or a command of the program.
     #[test]
     fn what_messages_advise_exists() {
-        let commands: Vec<clap::Command> =
-            CommandLine::command().get_subcommands().cloned().collect();
+        let commands: Vec<clap::Command> = CommandLine::command().get_subcommands().cloned().collect();
         let flags: Vec<String> = commands
             .iter()
             .flat_map(clap::Command::get_arguments)

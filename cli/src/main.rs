@@ -44,9 +44,7 @@ fn main() -> ExitCode {
                 CommandFailure::Library(Error::Model(faults)) => {
                     // Each fault has its line, what was expected, and a remedy.
                     let in_colour = terminal::is_stderr_coloured();
-                    terminal::print_to_stderr(
-                        faults.render_spelled(in_colour, &FlagSpelling).trim_end(),
-                    );
+                    terminal::print_to_stderr(faults.render_spelled(in_colour, &FlagSpelling).trim_end());
                 }
                 CommandFailure::Library(error) => terminal::error(&error.spell(&FlagSpelling)),
                 CommandFailure::Input(says) | CommandFailure::Usage(says) => terminal::error(says),

@@ -20,10 +20,7 @@ pub(crate) struct OutputFile(PathBuf);
 
 impl OutputFile {
     /// Refuses a target that is one of the files that the command reads, or a folder.
-    pub(crate) fn new<'a>(
-        path: &Path,
-        inputs: impl IntoIterator<Item = &'a Path>,
-    ) -> CommandOutcome<Self> {
+    pub(crate) fn new<'a>(path: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> CommandOutcome<Self> {
         Self::for_flag("--out", path, inputs)
     }
 
@@ -111,9 +108,9 @@ fn write_failure(error: &FileError) -> CommandFailure {
     let path = error.path.display();
     CommandFailure::Input(match &error.fault {
         // Some systems have folders in which no file can be made.
-        FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => format!(
-            "{path} cannot be written: its folder does not accept this file; choose another folder"
-        ),
+        FileFault::Missing if error.path.parent().is_some_and(Path::is_dir) => {
+            format!("{path} cannot be written: its folder does not accept this file; choose another folder")
+        }
         FileFault::Missing => format!(
             "{path} cannot be written: there is no such folder; check that the folder exists and may be written to"
         ),

@@ -29,9 +29,7 @@ pub use derive::base::BaseParameterEntry;
 pub use derive::{BaseFormulas, Derivation, derive_columns};
 pub use error::DeriveError;
 pub use evaluate::{ModelEvaluator, MotionStates, PoseFault, PoseReason};
-pub use lower::{
-    OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
-};
+pub use lower::{OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId};
 pub use modelmill_algebra::field;
 pub use on_request::dynamics::DynamicsPrograms;
 pub use on_request::passes::PassCount;
@@ -39,8 +37,8 @@ pub use on_request::reactions::{JointReaction, LoopReaction, ReactionPrograms};
 pub use programs::{LoopPrograms, ModelPrograms, PassivePosition};
 pub use reduce::base::BaseDenominator;
 pub use reduce::{
-    BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction,
-    ReductionMethod, TrigonometricPolynomial,
+    BaseReduction, ColumnDependency, FactorVariable, PowerProduct, RationalFunction, ReductionMethod,
+    TrigonometricPolynomial,
 };
 pub use tree::expressions::ParameterMonomial;
 

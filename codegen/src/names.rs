@@ -66,10 +66,7 @@ impl NamedQuantities {
         // Quantities that have not been used as a name yet.
         let mut free: Vec<&(FormulaSymbol, f64)> = self.known.iter().collect();
         for (i, (op, value)) in program.ops.iter().zip(&values).enumerate() {
-            if matches!(
-                op,
-                ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)
-            ) {
+            if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_)) {
                 continue;
             }
             // Values agree up to sign and rounding.
@@ -104,11 +101,7 @@ fn uniform(stream: &mut RandomStream) -> f64 {
 
 /// A random state near the nominal pose, for constants that differ slightly from the file's. `scale` is the size of the
 /// differences; `None` if the loops cannot close there.
-fn generic_state(
-    derivation: &Derivation,
-    scale: f64,
-    stream: &mut RandomStream,
-) -> Option<BTreeMap<Atom, f64>> {
+fn generic_state(derivation: &Derivation, scale: f64, stream: &mut RandomStream) -> Option<BTreeMap<Atom, f64>> {
     let mechanism = &derivation.mechanism;
     let (active, passive) = derivation.coordinates();
     // Changed constants separate quantities that are equal only for the file's values.
@@ -118,23 +111,12 @@ fn generic_state(
         .map(|c| c.value * (1.0 + scale * uniform(stream)))
         .collect();
     // Positions close to the nominal pose.
-    let near = |i: &usize, stream: &mut RandomStream| {
-        mechanism.coordinates[*i].nominal + scale * uniform(stream)
-    };
+    let near = |i: &usize, stream: &mut RandomStream| mechanism.coordinates[*i].nominal + scale * uniform(stream);
     let q: Vec<f64> = active.iter().map(|i| near(i, stream)).collect();
     // Rates, accelerations, loads and parameters are away from zero, so that no quantity vanishes by chance.
     // Rates and accelerations between 0.3 and 2.3.
-    let [qd, qdd] = [(); 2].map(|()| {
-        active
-            .iter()
-            .map(|_| 1.3 + uniform(stream))
-            .collect::<Vec<f64>>()
-    });
-    let load: Vec<f64> = mechanism
-        .drives
-        .iter()
-        .map(|_| 1.7 + uniform(stream))
-        .collect();
+    let [qd, qdd] = [(); 2].map(|()| active.iter().map(|_| 1.3 + uniform(stream)).collect::<Vec<f64>>());
+    let load: Vec<f64> = mechanism.drives.iter().map(|_| 1.7 + uniform(stream)).collect();
     // Passive motion from the evaluator.
     let motion = {
         fn slices(values: &[f64]) -> Vec<&[f64]> {
@@ -196,9 +178,7 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) 
             ProgramOp::Neg(a) => -at(a),
             ProgramOp::Unary(Unary::Sqrt, a) => at(a).sqrt(),
             // The same functions as for expressions, so that the values agree.
-            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0)
-                .unary(*function, &at(a))
-                .unwrap_or(f64::NAN),
+            ProgramOp::Unary(function, a) => FloatDomain(|_| 0.0).unary(*function, &at(a)).unwrap_or(f64::NAN),
             ProgramOp::Sin(a) => at(a).sin(),
             ProgramOp::Cos(a) => at(a).cos(),
             ProgramOp::Atan2(y, x) => at(y).atan2(at(x)),
@@ -209,10 +189,7 @@ fn operation_values(program: &StraightLineProgram, atoms: &BTreeMap<Atom, f64>) 
 }
 
 /// Symbols and values of the known quantities; of several with equal magnitude the first one is used.
-fn evaluate_quantities(
-    derivation: &Derivation,
-    atoms: &BTreeMap<Atom, f64>,
-) -> Vec<(FormulaSymbol, f64)> {
+fn evaluate_quantities(derivation: &Derivation, atoms: &BTreeMap<Atom, f64>) -> Vec<(FormulaSymbol, f64)> {
     // Quantities are built in a copy of the graph.
     let mut graph = derivation.graph.clone();
     // In order of precedence.
@@ -243,9 +220,9 @@ fn evaluate_quantities(
         let Some(value) = value else {
             continue;
         };
-        let taken = known.iter().any(|(s, v)| {
-            *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs()
-        });
+        let taken = known
+            .iter()
+            .any(|(s, v)| *s == symbol || (value.abs() - v.abs()).abs() <= RELATIVE_AGREEMENT * v.abs());
         if value.is_finite() && value != 0.0 && !taken && !reserved.contains(&symbol.text()) {
             known.push((symbol, value));
         }
@@ -263,10 +240,7 @@ pub(crate) fn reserved_names(mechanism: &Mechanism) -> BTreeSet<String> {
 }
 
 /// Sines and cosines of sums of angles: `c_theta1_gamma1`.
-fn trigonometric_quantities(
-    graph: &mut Graph,
-    derivation: &Derivation,
-) -> Vec<(FormulaSymbol, ExprId)> {
+fn trigonometric_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSymbol, ExprId)> {
     let projection = &derivation.equations.projection;
     let mechanism = &derivation.mechanism;
     // All sines and cosines in the closure equations, then those of the passive coordinates.
@@ -291,11 +265,7 @@ fn trigonometric_quantities(
 }
 
 /// Name of a sine or cosine.
-fn trigonometric_name(
-    mechanism: &Mechanism,
-    letter: &str,
-    angle: &crate::expr::AtomAngleSum,
-) -> FormulaSymbol {
+fn trigonometric_name(mechanism: &Mechanism, letter: &str, angle: &crate::expr::AtomAngleSum) -> FormulaSymbol {
     let mut name = letter.to_owned();
     for (atom, n) in angle.terms() {
         // Factors other than one are part of the name.
@@ -321,10 +291,7 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
     // Passive coordinates.
     for (k, p) in projection.loops.passive.iter().enumerate() {
         let name = &*mechanism.coordinates[*p].name;
-        named.push((
-            FormulaSymbol::time_derivative(name, 1),
-            projection.passive_rates[k],
-        ));
+        named.push((FormulaSymbol::time_derivative(name, 1), projection.passive_rates[k]));
         named.push((
             FormulaSymbol::time_derivative(name, 2),
             projection.passive_accelerations[k],
@@ -340,21 +307,10 @@ fn motion_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         let name = format!("l_{}", drive.name);
         named.push((FormulaSymbol::new(&*name), motion.coordinate));
         named.push((FormulaSymbol::time_derivative(&*name, 1), motion.rate));
-        named.push((
-            FormulaSymbol::time_derivative(&*name, 2),
-            motion.acceleration,
-        ));
-        for (a, slope) in projection
-            .loops
-            .active
-            .iter()
-            .zip(&projection.drive_jacobian[d])
-        {
+        named.push((FormulaSymbol::time_derivative(&*name, 2), motion.acceleration));
+        for (a, slope) in projection.loops.active.iter().zip(&projection.drive_jacobian[d]) {
             let coordinate = &mechanism.coordinates[*a].name;
-            named.push((
-                FormulaSymbol::new(format!("J_{}_{coordinate}", drive.name)),
-                *slope,
-            ));
+            named.push((FormulaSymbol::new(format!("J_{}_{coordinate}", drive.name)), *slope));
         }
     }
     // Determinants and their inverses, which linear systems use.
@@ -408,8 +364,8 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
         // Revolute joints add to the angular velocity about z.
         for (coordinate, n) in &link.turns {
             let n = crate::expr::Rational::integer(i64::from(*n));
-            let [rate, acceleration] = [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)]
-                .map(|atom| graph.atom(atom));
+            let [rate, acceleration] =
+                [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)].map(|atom| graph.atom(atom));
             let turn = [vector::ZERO[0], vector::ZERO[1], graph.scale(rate, &n)];
             let coupled = graph.cross(&omega, &turn);
             alpha = graph.add_vectors(&[alpha, coupled]);
@@ -419,14 +375,10 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
         }
         // Prismatic joints add the Coriolis term and the acceleration along z.
         for (coordinate, k) in &link.slides {
-            let [rate, acceleration] = [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)]
-                .map(|atom| graph.atom(atom));
+            let [rate, acceleration] =
+                [Atom::Rate(*coordinate), Atom::Acceleration(*coordinate)].map(|atom| graph.atom(atom));
             let twice = crate::expr::Rational::integer(2);
-            let slide = [
-                vector::ZERO[0],
-                vector::ZERO[1],
-                graph.scale(rate, &(k * &twice)),
-            ];
+            let slide = [vector::ZERO[0], vector::ZERO[1], graph.scale(rate, &(k * &twice))];
             let coriolis = graph.cross(&omega, &slide);
             a = graph.add_vectors(&[a, coriolis]);
             let along = graph.scale(acceleration, k);
@@ -453,14 +405,8 @@ fn link_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaSy
             let both = graph.add(squares[0], squares[1]);
             named.push((FormulaSymbol::new(entry(axis, axis)), graph.neg(both)));
             let product = graph.mul(omega[axis], omega[j]);
-            named.push((
-                FormulaSymbol::new(entry(axis, j)),
-                graph.sub(product, alpha[k]),
-            ));
-            named.push((
-                FormulaSymbol::new(entry(j, axis)),
-                graph.add(product, alpha[k]),
-            ));
+            named.push((FormulaSymbol::new(entry(axis, j)), graph.sub(product, alpha[k])));
+            named.push((FormulaSymbol::new(entry(j, axis)), graph.add(product, alpha[k])));
         }
         let parent = &mechanism.frames[frame.parent.0].name;
         for (axis, id) in AXES.iter().zip(before[*link]) {
@@ -503,10 +449,7 @@ fn wrench_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(Formula
         for (letter, own) in [("F", force), ("M", moment)] {
             let turned = graph.rotate_out(&turn, &own);
             for (k, axis) in AXES.iter().enumerate() {
-                named.push((
-                    FormulaSymbol::new(format!("{letter}_{}_{axis}", frame.name)),
-                    own[k],
-                ));
+                named.push((FormulaSymbol::new(format!("{letter}_{}_{axis}", frame.name)), own[k]));
                 let along = format!("{letter}_{}_{carries}_{axis}", frame.name);
                 named.push((FormulaSymbol::new(along), turned[k]));
             }
@@ -531,7 +474,7 @@ fn point_quantities(graph: &mut Graph, derivation: &Derivation) -> Vec<(FormulaS
     }
     // A point whose position has no expression leaves all positions without names.
     let places: Option<Vec<SymbolicVector>> = (0..mechanism.points.len())
-        .map(|i| crate::loops::stretch::position_in_base(graph, &mechanism, tree, i).ok())
+        .map(|i| crate::loops::segment::position_in_base(graph, &mechanism, tree, i).ok())
         .collect();
     let Some(places) = places else {
         return Vec::new();

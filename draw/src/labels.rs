@@ -49,11 +49,7 @@ impl LabelLayout {
 
     /// The place of a name with a number of letters next to a point: the start of its base line, and its anchor. `None`
     /// if all places near the point are occupied.
-    pub(crate) fn place_label(
-        &mut self,
-        [x, y]: [f64; 2],
-        letters: usize,
-    ) -> Option<(f64, f64, &'static str)> {
+    pub(crate) fn place_label(&mut self, [x, y]: [f64; 2], letters: usize) -> Option<(f64, f64, &'static str)> {
         let width = LETTER_WIDTH * letters as f64;
         let mut best: Option<(f64, (f64, f64, &'static str), LabelBox)> = None;
         // Eight directions at two distances.
@@ -88,11 +84,7 @@ impl LabelLayout {
                 if is_outside {
                     continue;
                 }
-                let cost: f64 = self
-                    .taken
-                    .iter()
-                    .map(|other| room.overlap_area(other))
-                    .sum();
+                let cost: f64 = self.taken.iter().map(|other| room.overlap_area(other)).sum();
                 if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
                     best = Some((cost, (at_x, at_y, anchor), room));
                 }

@@ -49,15 +49,13 @@ pub(crate) fn drive_arrow(
             // A positive force pushes the ends apart.
             straight_arrow(b, along, force) + &straight_arrow(a, along.map(|x| -x), force)
         }
-        MarkShape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => {
-            joint_arrow(
-                joint,
-                at(&joint.at),
-                direction(&joint.axis),
-                towards(&joint.axis),
-                force,
-            )
-        }
+        MarkShape::Joint(joint) if joint.drive.as_deref() == Some(load.drive.as_str()) => joint_arrow(
+            joint,
+            at(&joint.at),
+            direction(&joint.axis),
+            towards(&joint.axis),
+            force,
+        ),
         _ => return String::new(),
     };
     let error = if load.error.is_finite() {
@@ -70,13 +68,7 @@ pub(crate) fn drive_arrow(
 }
 
 /// The arrow of a joint: along its axis if it is prismatic, else around it.
-fn joint_arrow(
-    joint: &JointMark,
-    at: [f64; 2],
-    axis: [f64; 2],
-    towards: f64,
-    force: f64,
-) -> String {
+fn joint_arrow(joint: &JointMark, at: [f64; 2], axis: [f64; 2], towards: f64, force: f64) -> String {
     if joint.is_prismatic && !joint.is_revolute {
         let length = axis[0].hypot(axis[1]);
         return straight_arrow(at, axis, force * length.max(0.2));
@@ -115,12 +107,7 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
     if turn.abs() * ARC_RADIUS < SHORTEST_ARROW {
         return String::new();
     }
-    let place = |angle: f64| {
-        [
-            at[0] + ARC_RADIUS * angle.cos(),
-            at[1] - ARC_RADIUS * angle.sin(),
-        ]
-    };
+    let place = |angle: f64| [at[0] + ARC_RADIUS * angle.cos(), at[1] - ARC_RADIUS * angle.sin()];
     let (start, end) = (place(0.0), place(turn));
     // The tangent of the circle at the end.
     let along = [-turn.signum() * turn.sin(), -turn.signum() * turn.cos()];
@@ -140,8 +127,5 @@ fn circular_arrow(at: [f64; 2], force: f64) -> String {
 fn arrow_head(tip: [f64; 2], along: [f64; 2]) -> String {
     let across = [-along[1], along[0]];
     let corner = |back: f64, side: f64| [0, 1].map(|k| tip[k] + back * along[k] + side * across[k]);
-    polygon(
-        "head",
-        &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)],
-    )
+    polygon("head", &[corner(5.0, 0.0), corner(-5.0, 4.5), corner(-5.0, -4.5)])
 }

@@ -85,11 +85,7 @@ pub fn loaded_svg(
 }
 
 /// The same as a part of an HTML page, which needs no namespace.
-pub fn inline_svg(
-    scenes: &[&MechanismScene],
-    view: &ViewDirection,
-    style: &DrawingStyle,
-) -> String {
+pub fn inline_svg(scenes: &[&MechanismScene], view: &ViewDirection, style: &DrawingStyle) -> String {
     svg(scenes, view, style).replacen(NAMESPACE, "", 1)
 }
 
@@ -98,10 +94,7 @@ fn describe_scene(scene: &MechanismScene) -> String {
     let count = |is: fn(&MarkShape) -> bool| scene.marks.iter().filter(|m| is(&m.shape)).count();
     let kinds = [
         ("joint", count(|s| matches!(s, MarkShape::Joint(_)))),
-        (
-            "drive between points",
-            count(|s| matches!(s, MarkShape::Drive(_))),
-        ),
+        ("drive between points", count(|s| matches!(s, MarkShape::Drive(_)))),
         ("closed loop", count(|s| matches!(s, MarkShape::Closing(_)))),
         ("lumped mass", count(|s| matches!(s, MarkShape::Lump(..)))),
     ];
@@ -150,10 +143,7 @@ impl<'a> DrawingSheet<'a> {
             }
         }
         // The scale at which that range fits within the margins.
-        let room = [
-            style.width - 2.0 * MARGIN,
-            style.height - 2.0 * MARGIN - 16.0,
-        ];
+        let room = [style.width - 2.0 * MARGIN, style.height - 2.0 * MARGIN - 16.0];
         let scales = [0, 1].map(|k| room[k].max(1.0) / (range[k][1] - range[k][0]).max(1e-9));
         let smallest = scales[0].min(scales[1]);
         let middle = range.map(|[low, high]| 0.5 * (low + high));
@@ -247,8 +237,7 @@ impl<'a> DrawingSheet<'a> {
                 symbols::rail(self.project_point(at), along)
             }
             MarkShape::Plate(corners) => {
-                let corners: Vec<[f64; 2]> =
-                    corners.iter().map(|at| self.project_point(at)).collect();
+                let corners: Vec<[f64; 2]> = corners.iter().map(|at| self.project_point(at)).collect();
                 symbols::polygon("plate", &corners)
             }
             MarkShape::Joint(joint) => {
@@ -257,9 +246,7 @@ impl<'a> DrawingSheet<'a> {
                 symbols::joint(joint, spot(&joint.at), axis, towards)
             }
             MarkShape::Closing(at) => symbols::loop_closure(spot(at)),
-            MarkShape::Drive(ends) => {
-                symbols::drive(ends.each_ref().map(|at| self.project_point(at)))
-            }
+            MarkShape::Drive(ends) => symbols::drive(ends.each_ref().map(|at| self.project_point(at))),
             MarkShape::Ground(at) => {
                 let up = scene.down.map_or_else(Vector3::z, |down| -down);
                 symbols::ground(
@@ -269,9 +256,7 @@ impl<'a> DrawingSheet<'a> {
                 )
             }
             MarkShape::Point(at) => symbols::point(self.project_point(at)),
-            MarkShape::Lump(at, mass) => {
-                symbols::lump(self.project_point(at), self.mass_radius(*mass), *mass < 0.0)
-            }
+            MarkShape::Lump(at, mass) => symbols::lump(self.project_point(at), self.mass_radius(*mass), *mass < 0.0),
             MarkShape::Centre(at, mass) => {
                 symbols::centre(self.project_point(at), self.mass_radius(*mass), *mass < 0.0)
             }
@@ -311,14 +296,8 @@ impl<'a> DrawingSheet<'a> {
                 depth,
             ));
         }
-        let axes =
-            [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
-        out.push_str(&symbols::axes(
-            [26.0, height - 24.0],
-            &axes,
-            28.0,
-            ["x", "y", "z"],
-        ));
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| self.project_direction(&axis));
+        out.push_str(&symbols::axes([26.0, height - 24.0], &axes, 28.0, ["x", "y", "z"]));
         // A round length of about a fifth of the width.
         let length = round_length(0.2 * width / self.scale);
         let (x, y) = (width - 14.0, height - 14.0);
@@ -355,10 +334,7 @@ impl<'a> DrawingSheet<'a> {
                 MarkShape::Joint(joint) => (self.project_point(&joint.at), "of-joint"),
                 MarkShape::Drive(ends) => {
                     let [a, b] = ends.each_ref().map(|at| self.project_point(at));
-                    (
-                        [0.6 * a[0] + 0.4 * b[0], 0.6 * a[1] + 0.4 * b[1]],
-                        "of-drive",
-                    )
+                    ([0.6 * a[0] + 0.4 * b[0], 0.6 * a[1] + 0.4 * b[1]], "of-drive")
                 }
                 MarkShape::Point(at) => (self.project_point(at), "of-point"),
                 _ => continue,

@@ -21,11 +21,7 @@ pub(crate) fn plane_of_motion<'a>(
         .collect();
     // A normal of a prismatic axis: perpendicular to another one, or to gravity, or to an axis of the base.
     let across = |a: &Vector3<f64>| {
-        let others = sliding
-            .iter()
-            .copied()
-            .chain(down)
-            .chain(Vector3::identity_axes());
+        let others = sliding.iter().copied().chain(down).chain(Vector3::identity_axes());
         let mut normals = others.map(|b| a.cross(&b));
         normals.find(|n| n.norm() > PARALLEL)
     };
@@ -120,25 +116,14 @@ mod tests {
     #[test]
     fn a_square_with_a_place_inside_has_four_corners() {
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, -0.7, 1.1);
-        let square = [
-            [0.0, 0.0],
-            [1.0, 0.0],
-            [1.0, 1.0],
-            [0.0, 1.0],
-            [0.4, 0.6],
-            [0.5, 0.0],
-        ];
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.4, 0.6], [0.5, 0.0]];
         let places = square.map(|[x, y]| turn * Vector3::new(x, y, 2.0));
         let corners = convex_hull(&places).expect("a plane");
         assert_eq!(corners.len(), 4);
-        let around: f64 = (0..4)
-            .map(|i| (corners[i] - corners[(i + 1) % 4]).norm())
-            .sum();
+        let around: f64 = (0..4).map(|i| (corners[i] - corners[(i + 1) % 4]).norm()).sum();
         assert!((around - 4.0).abs() < 1e-9, "{around}");
         // On a line, and in no plane.
         assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), 2.0 * Vector3::x()]).is_none());
-        assert!(
-            convex_hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none()
-        );
+        assert!(convex_hull(&[Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]).is_none());
     }
 }

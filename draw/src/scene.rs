@@ -1,8 +1,8 @@
 //! The shapes of a mechanism: at given coordinates it becomes bars, joints, loops, drives and masses in the base frame.
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, ExactExpression, FrameIdx, FramePlacement, FrameStep, Kinematics,
-    LumpedMass, Mechanism, MechanismPoses, ModelPart, ModelSymbol, PartInertia, PointIdx,
+    CoordinateIdx, DriveKind, ExactExpression, FrameIdx, FramePlacement, FrameStep, Kinematics, LumpedMass, Mechanism,
+    MechanismPoses, ModelPart, ModelSymbol, PartInertia, PointIdx,
 };
 use nalgebra::Vector3;
 
@@ -140,20 +140,11 @@ impl MechanismScene {
         // A free body leaves every plane.
         let mut steps = mechanism.frames.iter().flat_map(|frame| &frame.steps);
         let flies = steps.any(|step| matches!(step, FrameStep::Free(_)));
-        let gravity = Vector3::from(
-            mechanism
-                .gravity
-                .each_ref()
-                .map(|g| constant_value(mechanism, g)),
-        );
+        let gravity = Vector3::from(mechanism.gravity.each_ref().map(|g| constant_value(mechanism, g)));
         let down = gravity.try_normalize(0.0);
         Self {
             title: (mechanism.title.clone()).unwrap_or_else(|| mechanism.name.clone()),
-            plane: if flies {
-                None
-            } else {
-                plane_of_motion(joints, down)
-            },
+            plane: if flies { None } else { plane_of_motion(joints, down) },
             marks: builder.marks,
             down,
         }
@@ -219,11 +210,7 @@ impl Builder<'_> {
         let pose = self.frame_pose(frame).clone();
         let mut body = self.bodies[own.parent.0];
         let mut from = Vector3::from(self.frame_pose(own.parent.0).origin);
-        if own
-            .steps
-            .iter()
-            .any(|step| matches!(step, FrameStep::Free(_)))
-        {
+        if own.steps.iter().any(|step| matches!(step, FrameStep::Free(_))) {
             // A free body is not connected to its parent, so no bar leads there.
             body = self.n_bodies;
             self.n_bodies += 1;
@@ -248,10 +235,7 @@ impl Builder<'_> {
                 let [p, q] = [first, other].map(|m| Vector3::from(m.origin));
                 (p - q).norm() < 1e-12 && (a - b).norm() < 1e-9
             };
-            let count = pose.joint_axes[next..]
-                .iter()
-                .take_while(|m| is_same(m))
-                .count();
+            let count = pose.joint_axes[next..].iter().take_while(|m| is_same(m)).count();
             let together = &pose.joint_axes[next..next + count];
             self.add_joint(together, frame, &mut body);
             next += count;
@@ -278,12 +262,7 @@ impl Builder<'_> {
     }
 
     /// Adds a joint. Behind it a new body begins, whose index `body` gets.
-    fn add_joint(
-        &mut self,
-        together: &[modelmill_spec::CoordinateAxis],
-        frame: usize,
-        body: &mut usize,
-    ) {
+    fn add_joint(&mut self, together: &[modelmill_spec::CoordinateAxis], frame: usize, body: &mut usize) {
         let coordinates = &self.mechanism.coordinates;
         let names: Vec<&str> = (together.iter())
             .map(|moved| coordinates[moved.coordinate].name.as_str())
@@ -293,18 +272,12 @@ impl Builder<'_> {
         // The drive on one of the joint's coordinates, if there is one.
         let driven_by = |c: usize| {
             let kind = DriveKind::Joint(CoordinateIdx(c));
-            drives
-                .iter()
-                .find(|drive| drive.is_driven && drive.kind == kind)
+            drives.iter().find(|drive| drive.is_driven && drive.kind == kind)
         };
-        let drive = together
-            .iter()
-            .find_map(|moved| driven_by(moved.coordinate));
+        let drive = together.iter().find_map(|moved| driven_by(moved.coordinate));
         let moved_by = match drive {
             Some(_) => JointActuation::Drive,
-            None if together.iter().all(|m| coordinates[m.coordinate].passive) => {
-                JointActuation::Loops
-            }
+            None if together.iter().all(|m| coordinates[m.coordinate].passive) => JointActuation::Loops,
             None => JointActuation::Independent,
         };
         // Kinds of motion of its coordinates.
@@ -349,10 +322,7 @@ impl Builder<'_> {
         let mechanism = self.mechanism;
         // Whether a loop or a drive is connected to a point.
         let held = |point: usize| {
-            let in_loop = mechanism
-                .loops
-                .iter()
-                .any(|l| l.joins.contains(&PointIdx(point)));
+            let in_loop = mechanism.loops.iter().any(|l| l.joins.contains(&PointIdx(point)));
             in_loop
                 || mechanism
                     .drives
@@ -378,10 +348,7 @@ impl Builder<'_> {
                 let frame = &mechanism.frames[point.frame.0].name;
                 self.add_mark(shape, body, "", frame.clone());
             }
-            let says = format!(
-                "point {} of {}",
-                point.name, mechanism.frames[point.frame.0].name
-            );
+            let says = format!("point {} of {}", point.name, mechanism.frames[point.frame.0].name);
             self.add_mark(MarkShape::Point(at), body, &point.name, says);
         }
         for closed in &mechanism.loops {
@@ -418,9 +385,7 @@ impl Builder<'_> {
     fn add_masses(&mut self) {
         let mechanism = self.mechanism;
         let of_effects = mechanism.effects.iter();
-        let lumps = of_effects
-            .clone()
-            .flat_map(|effect| &effect.bodies.lumped_masses);
+        let lumps = of_effects.clone().flat_map(|effect| &effect.bodies.lumped_masses);
         for lump in mechanism.lumped_masses.iter().chain(lumps) {
             self.add_lump(lump);
         }
@@ -433,8 +398,7 @@ impl Builder<'_> {
     /// Adds a lumped mass at the point where its force acts.
     fn add_lump(&mut self, lump: &LumpedMass) {
         let share = modelmill_spec::ExactExpression::Rational(lump.share.clone());
-        let mass =
-            constant_value(self.mechanism, &lump.mass) * constant_value(self.mechanism, &share);
+        let mass = constant_value(self.mechanism, &lump.mass) * constant_value(self.mechanism, &share);
         let at = self.place_in_base(lump.frame, &lump.force_at);
         let says = format!("{} = {mass:.4} kg", self.mechanism.text_of(&lump.mass));
         let body = self.bodies[lump.frame.0];
@@ -465,13 +429,9 @@ impl Builder<'_> {
     fn add_centre_of_mass(&mut self, part: &ModelPart) {
         let value = |exact: &ExactExpression| constant_value(self.mechanism, exact);
         let (mass, at) = match &part.inertial {
-            PartInertia::AboutCentre { mass, centre, .. } => {
-                (value(mass), self.place_in_base(part.frame, centre))
-            }
+            PartInertia::AboutCentre { mass, centre, .. } => (value(mass), self.place_in_base(part.frame, centre)),
             // The centre is the first moment divided by the mass.
-            PartInertia::Linear {
-                mass, first_moment, ..
-            } => {
+            PartInertia::Linear { mass, first_moment, .. } => {
                 let mass = value(mass);
                 let local = first_moment.each_ref().map(|m| value(m) / mass);
                 let pose = self.frame_pose(part.frame.0);
@@ -495,8 +455,7 @@ impl Builder<'_> {
         for body in 1..self.n_bodies {
             if let Some(corners) = convex_hull(&self.anchors[body]) {
                 let mut marks = self.marks.iter();
-                let says =
-                    marks.find(|mark| mark.body == body && matches!(mark.shape, MarkShape::Bar(_)));
+                let says = marks.find(|mark| mark.body == body && matches!(mark.shape, MarkShape::Bar(_)));
                 let says = says.map_or_else(String::new, |mark| mark.description.clone());
                 self.add_mark(MarkShape::Plate(corners), body, "", says);
             }

@@ -81,12 +81,7 @@ fn cylinder(class: &str, at: [f64; 2], along: [f64; 2], length: f64, towards: f6
     // The end that is nearer to the viewer shows its cap.
     let near = if towards > 0.0 { 1.0 } else { -1.0 };
     let [far, close] = [end(-near), end(near)];
-    let [a, b, c, d] = [
-        edge(far, 1.0),
-        edge(close, 1.0),
-        edge(close, -1.0),
-        edge(far, -1.0),
-    ];
+    let [a, b, c, d] = [edge(far, 1.0), edge(close, 1.0), edge(close, -1.0), edge(far, -1.0)];
     // The outline of the far cap bulges away from the near one.
     let sweep = u8::from(near < 0.0);
     let hull = format!(
@@ -108,8 +103,7 @@ fn sleeve(class: &str, at: [f64; 2], axis: [f64; 2], length: f64) -> String {
     };
     let half = [(13.0 * length).max(7.0), 7.0];
     let across = [-along[1], along[0]];
-    let corner =
-        |u: f64, v: f64| [0, 1].map(|k| at[k] + u * half[0] * along[k] + v * half[1] * across[k]);
+    let corner = |u: f64, v: f64| [0, 1].map(|k| at[k] + u * half[0] * along[k] + v * half[1] * across[k]);
     let corners = [
         corner(-1.0, -1.0),
         corner(1.0, -1.0),
@@ -179,20 +173,12 @@ pub(crate) fn point(at: [f64; 2]) -> String {
 
 /// A lumped mass; a negative one has another class.
 pub(crate) fn lump(at: [f64; 2], radius: f64, is_negative: bool) -> String {
-    circle(
-        if is_negative { "lump negative" } else { "lump" },
-        at,
-        radius,
-    )
+    circle(if is_negative { "lump negative" } else { "lump" }, at, radius)
 }
 
 /// The symbol of a centre of mass: a disc with two dark quarters.
 pub(crate) fn centre([x, y]: [f64; 2], r: f64, is_negative: bool) -> String {
-    let class = if is_negative {
-        "centre negative"
-    } else {
-        "centre"
-    };
+    let class = if is_negative { "centre negative" } else { "centre" };
     circle(class, [x, y], r)
         + &format!(
             "<path class=\"quarters\" d=\"M{x:.1} {y:.1}v{:.1}A{r:.1} {r:.1} 0 0 1 {:.1} {y:.1}ZM{x:.1} {y:.1}v{r:.1}A{r:.1} {r:.1} 0 0 1 {:.1} {y:.1}Z\"/>",
@@ -234,9 +220,7 @@ pub(crate) fn gravity(at: [f64; 2], down: [f64; 2], towards: f64) -> String {
             circle("pin", [x, y + 10.0], 2.0)
         } else {
             let (a, b, c, d) = (x - 4.2, y + 5.8, x + 4.2, y + 14.2);
-            format!(
-                "<path class=\"scale\" d=\"M{a:.1} {b:.1}L{c:.1} {d:.1}M{c:.1} {b:.1}L{a:.1} {d:.1}\"/>"
-            )
+            format!("<path class=\"scale\" d=\"M{a:.1} {b:.1}L{c:.1} {d:.1}M{c:.1} {b:.1}L{a:.1} {d:.1}\"/>")
         };
         return format!(
             "{}{inner}<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">g</text>",

@@ -16,11 +16,8 @@ fn bundled() -> Vec<PathBuf> {
 }
 
 fn load(name: &str) -> Mechanism {
-    let file =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../model-spec/models/{name}.toml"));
-    modelmill_spec::load_file(&file)
-        .expect("a bundled model")
-        .mechanism
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../model-spec/models/{name}.toml"));
+    modelmill_spec::load_file(&file).expect("a bundled model").mechanism
 }
 
 fn nominal(mechanism: &Mechanism) -> MechanismScene {
@@ -31,9 +28,7 @@ fn nominal(mechanism: &Mechanism) -> MechanismScene {
 #[test]
 fn every_bundled_model_is_drawn_within_its_sheet() {
     for file in bundled() {
-        let mechanism = modelmill_spec::load_file(&file)
-            .expect("a bundled model")
-            .mechanism;
+        let mechanism = modelmill_spec::load_file(&file).expect("a bundled model").mechanism;
         let scene = nominal(&mechanism);
         let style = DrawingStyle {
             frames: true,
@@ -71,11 +66,7 @@ fn every_bundled_model_is_drawn_within_its_sheet() {
 #[test]
 fn planar_mechanisms_are_seen_flat() {
     let planar: Vec<String> = (bundled().iter())
-        .map(|file| {
-            modelmill_spec::load_file(file)
-                .expect("a bundled model")
-                .mechanism
-        })
+        .map(|file| modelmill_spec::load_file(file).expect("a bundled model").mechanism)
         .filter(|mechanism| nominal(mechanism).plane.is_some())
         .map(|mechanism| mechanism.name)
         .collect();
@@ -117,29 +108,16 @@ fn lengths_are_those_of_the_model() {
     };
     let constant = |name: &str| {
         let mut constants = mechanism.constants.iter();
-        constants
-            .find(|c| c.name == name)
-            .expect("a constant")
-            .value
+        constants.find(|c| c.name == name).expect("a constant").value
     };
-    for (bodies, expected) in [
-        (["S1", "S7"], constant("d1")),
-        (["S3", "S5"], constant("d3")),
-    ] {
+    for (bodies, expected) in [(["S1", "S7"], constant("d1")), (["S3", "S5"], constant("d3"))] {
         for body in bodies {
-            assert!(
-                (length(body) - expected).abs() < 1e-9,
-                "{body}: {}",
-                length(body)
-            );
+            assert!((length(body) - expected).abs() < 1e-9, "{body}: {}", length(body));
         }
     }
     // Gravity points down in the picture.
     let down = view.project(&scene.down.expect("gravity"));
-    assert!(
-        down[0].abs() < 1e-12 && (down[1] + 1.0).abs() < 1e-12,
-        "{down:?}"
-    );
+    assert!(down[0].abs() < 1e-12 && (down[1] + 1.0).abs() < 1e-12, "{down:?}");
 }
 
 /// A loop that is open is seen open, and a variant lies over what it was.
@@ -163,11 +141,7 @@ fn what_is_wrong_is_seen() {
     q[passive] += 0.2;
     let open = MechanismScene::new(&mechanism, &q);
     assert_eq!(closings(&open), closings(&closed) + 1);
-    let text = svg(
-        &[&closed, &open],
-        &closed.best_view(),
-        &DrawingStyle::default(),
-    );
+    let text = svg(&[&closed, &open], &closed.best_view(), &DrawingStyle::default());
     assert_eq!(text.matches("class=\"shadow\"").count(), 1);
 }
 
@@ -181,12 +155,7 @@ fn forces_are_arrows_at_their_drives() {
             force,
             error: 1.0,
         };
-        let text = modelmill_draw::loaded_svg(
-            &[&scene],
-            &scene.best_view(),
-            &DrawingStyle::default(),
-            &[load],
-        );
+        let text = modelmill_draw::loaded_svg(&[&scene], &scene.best_view(), &DrawingStyle::default(), &[load]);
         let group = text.split("<g class=\"load e5\">").nth(1).expect("arrows");
         let d = group.split("d=\"M").nth(1).expect("a path");
         let numbers: Vec<f64> = d

@@ -56,8 +56,8 @@ const NEWER_KEYWORDS: [&str; 1] = ["gen"];
 
 /// Names in scope everywhere; a module of the same name would shadow them for its siblings.
 const IN_SCOPE: [&str; 20] = [
-    "alloc", "bool", "char", "core", "f32", "f64", "i8", "i16", "i32", "i64", "i128", "isize",
-    "std", "str", "u8", "u16", "u32", "u64", "u128", "usize",
+    "alloc", "bool", "char", "core", "f32", "f64", "i8", "i16", "i32", "i64", "i128", "isize", "std", "str", "u8",
+    "u16", "u32", "u64", "u128", "usize",
 ];
 
 /// The identifier of a field: the name itself, as `r#type` if it is a keyword.
@@ -113,10 +113,9 @@ mod tests {
     #[test]
     fn different_names_give_different_identifiers() {
         let names = [
-            "Gravity", "_Gravity", "None", "type", "type_", "_type", "r", "r_type", "self",
-            "self_", "_self", "Self", "super", "crate", "gen", "async", "try", "union", "x", "_",
-            "__", "_x", "_x_", "a-b", "a_b", "a_2d_b", "_a_2d_b", "\u{e4}", "_e4_", "1", "_1",
-            "f64", "_f64", "T", "Model",
+            "Gravity", "_Gravity", "None", "type", "type_", "_type", "r", "r_type", "self", "self_", "_self", "Self",
+            "super", "crate", "gen", "async", "try", "union", "x", "_", "__", "_x", "_x_", "a-b", "a_b", "a_2d_b",
+            "_a_2d_b", "\u{e4}", "_e4_", "1", "_1", "f64", "_f64", "T", "Model",
         ];
         for of in [field_identifier, module_identifier] {
             let mut seen = BTreeMap::new();

@@ -1,8 +1,6 @@
 //! The list of output languages, including crates that wrap the Rust module.
 
-use super::language::{
-    C99Sources, EmissionRequest, EmittedFile, OutputForm, OutputLanguage, RustModule,
-};
+use super::language::{C99Sources, EmissionRequest, EmittedFile, OutputForm, OutputLanguage, RustModule};
 use super::wrap::{emit_c, emit_python};
 
 /// All languages; the first is the default.

@@ -13,9 +13,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use modelmill_codegen::expr::{Atom, Unary};
-use modelmill_codegen::{
-    Derivation, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
-};
+use modelmill_codegen::{Derivation, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId};
 use modelmill_spec::Mechanism;
 
 use super::tree::in_order;
@@ -71,14 +69,9 @@ pub fn vectors_c(derivation: &Derivation, program: &StraightLineProgram, width: 
     for i in in_order(program, &vec![false; n], &vec![false; n], &vec![0; n]) {
         let op = &program.ops[i];
         let _ = match program.stages[i] {
-            ProgramStage::Fixed => writeln!(
-                fixed,
-                "    const double x{i} = {};",
-                scalar_operation(op, mechanism)
-            ),
+            ProgramStage::Fixed => writeln!(fixed, "    const double x{i} = {};", scalar_operation(op, mechanism)),
             ProgramStage::State => {
-                let statement =
-                    vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
+                let statement = vector_statement(i, op, &|atom| input(atom).map(|(_, k)| k), &is_fixed);
                 writeln!(of_state, "            {statement}")
             }
         };
@@ -246,11 +239,7 @@ fn vector_statement(
         ProgramOp::Unary(Unary::Abs, a) => format!("const V x{i} = absolute({});", wide(a)),
         // Functions without a vector form are applied lane by lane.
         ProgramOp::Unary(unary, a) => {
-            format!(
-                "V x{i} = {}; EACH(x{i}, {});",
-                wide(a),
-                function_name(*unary)
-            )
+            format!("V x{i} = {}; EACH(x{i}, {});", wide(a), function_name(*unary))
         }
         other => unreachable!("{other:?} is the same for all states"),
     }

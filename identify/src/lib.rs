@@ -49,27 +49,26 @@ mod test_noise;
 mod words;
 
 pub use audit::{
-    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit,
-    WiringFault, robust_fit,
+    ChannelRegressor, DelayAudit, DelayEstimate, ForceAudit, ForceDelays, PositionFault, RobustFit, WiringFault,
+    robust_fit,
 };
 pub use estimate::{
-    LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor,
-    RegressionSolution,
+    LeastSquares, LeastSquaresError, NullDirection, ParameterUncertainty, RANK_TOLERANCE, RFactor, RegressionSolution,
 };
 pub use figures::{
-    BandError, ChannelFigures, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput,
-    FiguresError, FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError,
-    FitParameter, LocateOptions, ParameterInfo, ParameterStatus, TIME_COLUMN, TRIMMED_PART,
-    add_filtered_forces, compare_forces, fit_parameters, locate_errors,
+    BandError, ChannelFigures, ErrorAccumulator, ErrorFigures, ErrorRegion, EstimatorOutput, FiguresError,
+    FilteredChannelFigures, FilteredFigures, FitFault, FitFile, FitFileError, FitParameter, LocateOptions,
+    ParameterInfo, ParameterStatus, TIME_COLUMN, TRIMMED_PART, add_filtered_forces, compare_forces, fit_parameters,
+    locate_errors,
 };
 pub use motion::{
-    DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun,
-    RunRepeatability, SmoothedCoordinate, SmoothingMethod, StatePreparation, decimate,
-    decimate_columns, decimate_table, decimate_time, differentiate, filter_and_differentiate,
+    DECIMATION_PASSBAND, DerivativeSource, PreparationChoices, PreparationRecord, PreparedRun, RunRepeatability,
+    SmoothedCoordinate, SmoothingMethod, StatePreparation, decimate, decimate_columns, decimate_table, decimate_time,
+    differentiate, filter_and_differentiate,
 };
 pub use recording::{
-    ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError,
-    RecordingFault, RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo,
-    display_name_of_bytes, has_recording_extension, sample_place_word,
+    ColumnInfo, ComputedColumn, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
+    RecordingFile, RecordingFiles, RecordingNote, SignalRecording, TableInfo, display_name_of_bytes,
+    has_recording_extension, sample_place_word,
 };
 pub use signal::{FilterError, LowPass, MAX_FILTER_ORDER};

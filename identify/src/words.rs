@@ -29,23 +29,15 @@ pub(crate) fn with_digits(value: f64, digits: usize) -> String {
 }
 
 /// The candidate that is spelt most like `wanted`, if it is near enough to be a likely mistake; case does not matter.
-pub(crate) fn nearest_name<'a>(
-    wanted: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(crate) fn nearest_name<'a>(wanted: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = wanted.to_lowercase();
     candidates
         .into_iter()
         .map(|candidate| {
             let other = candidate.to_lowercase();
             // A name with a unit behind it (`t_s` for `t`) is also likely.
-            let extends = other.starts_with(&format!("{lower}_"))
-                || (lower.len() > 2 && other.starts_with(&lower));
-            let distance = if extends {
-                1
-            } else {
-                edit_distance(&lower, &other)
-            };
+            let extends = other.starts_with(&format!("{lower}_")) || (lower.len() > 2 && other.starts_with(&lower));
+            let distance = if extends { 1 } else { edit_distance(&lower, &other) };
             (distance, candidate)
         })
         // Two different names of one letter are not similar.
@@ -76,11 +68,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 /// Names in backquotes, separated by commas; of a long list the first 40 and the number of the others.
 pub(crate) fn backquoted_list(names: &[String]) -> String {
     const SHOWN: usize = 40;
-    let shown: Vec<String> = names
-        .iter()
-        .take(SHOWN)
-        .map(|name| format!("`{name}`"))
-        .collect();
+    let shown: Vec<String> = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect();
     if names.len() > SHOWN {
         format!("{} and {} more", shown.join(", "), names.len() - SHOWN)
     } else {

@@ -19,7 +19,7 @@ unsafe extern "C" {
 /// The state between calls.
 struct BrowserState {
     /// Answers requests; it has the files and the session.
-    desk: RequestHandler,
+    request_handler: RequestHandler,
     /// Memory for the input of the next call.
     given: Vec<u8>,
     /// The last response.
@@ -29,9 +29,9 @@ struct BrowserState {
 thread_local! {
     // A worker is single-threaded, so one state per thread is one state per module.
     static STATE: RefCell<BrowserState> = RefCell::new(BrowserState {
-        desk: RequestHandler::new(|| seconds(), |told| {
-            let told = told.to_string();
-            goes(told.as_ptr(), told.len());
+        request_handler: RequestHandler::new(|| seconds(), |view_json| {
+            let view_json = view_json.to_string();
+            goes(view_json.as_ptr(), view_json.len());
         }),
         given: Vec::new(),
         answer: String::new(),
@@ -52,7 +52,7 @@ pub extern "C" fn reserve(length: usize) -> *mut u8 {
 pub extern "C" fn put(name: usize) {
     STATE.with_borrow_mut(|state| {
         let (name, bytes) = split_input(&state.given, name);
-        state.desk.add_file(&name, bytes);
+        state.request_handler.add_file(&name, bytes);
     });
 }
 
@@ -62,7 +62,7 @@ pub extern "C" fn put(name: usize) {
 pub extern "C" fn ask(question: usize) -> usize {
     STATE.with_borrow_mut(|state| {
         let (question, body) = split_input(&state.given, question);
-        state.answer = state.desk.answer_request(&question, body);
+        state.answer = state.request_handler.answer_request(&question, body);
         state.answer.len()
     })
 }

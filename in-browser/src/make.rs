@@ -20,12 +20,10 @@ fn workspace_root() -> PathBuf {
 /// Why the compiler cannot build for WebAssembly, with a remedy; `None` if it can.
 pub fn missing_target() -> Option<String> {
     let asked = ["--print", "target-libdir", "--target", TARGET];
-    let told = Command::new("rustc").args(asked).output().ok();
-    let library = told.map(|told| String::from_utf8_lossy(&told.stdout).trim().to_owned());
+    let view_json = Command::new("rustc").args(asked).output().ok();
+    let library = view_json.map(|view_json| String::from_utf8_lossy(&view_json.stdout).trim().to_owned());
     let is_there = library.is_some_and(|path| !path.is_empty() && Path::new(&path).is_dir());
-    (!is_there).then(|| {
-        format!("the compiler has no target {TARGET}; run `rustup target add {TARGET}` first")
-    })
+    (!is_there).then(|| format!("the compiler has no target {TARGET}; run `rustup target add {TARGET}` first"))
 }
 
 /// Compiles the workbench in a profile of the workspace, into the folder `builds`; returns the path of the module.
@@ -37,13 +35,7 @@ pub fn build_module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
     }
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
-        .args([
-            "build",
-            "--locked",
-            "--package",
-            env!("CARGO_PKG_NAME"),
-            "--lib",
-        ])
+        .args(["build", "--locked", "--package", env!("CARGO_PKG_NAME"), "--lib"])
         .args(["--target", TARGET, "--profile", profile, "--target-dir"])
         .arg(builds)
         .current_dir(workspace_root())
@@ -63,9 +55,7 @@ pub fn build_module(profile: &str, builds: &Path) -> Result<PathBuf, String> {
 ///
 /// Fails with a sentence if a file cannot be read.
 pub fn load_bundle() -> Result<PageBundle, String> {
-    let text = |path: &Path| {
-        fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
-    };
+    let text = |path: &Path| fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()));
     let folder = workspace_root().join("model-spec/models");
     let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
@@ -77,15 +67,9 @@ pub fn load_bundle() -> Result<PageBundle, String> {
         bundle.models.push((name.into_owned(), text(&path)?));
     }
     for (name, is_check) in [("with-rods-fit.csv", false), ("with-rods-check.csv", true)] {
-        let text = text(
-            &workspace_root()
-                .join("recordings/spidermill-mbs")
-                .join(name),
-        )?;
+        let text = text(&workspace_root().join("recordings/spidermill-mbs").join(name))?;
         let model = "spidermill.toml".to_owned();
-        bundle
-            .recordings
-            .push((model, name.to_owned(), text, is_check));
+        bundle.recordings.push((model, name.to_owned(), text, is_check));
     }
     Ok(bundle)
 }
@@ -95,10 +79,7 @@ pub fn load_bundle() -> Result<PageBundle, String> {
 /// Fails with a sentence if a file cannot be read.
 pub fn build_page(module: &Path) -> Result<String, String> {
     let module = fs::read(module).map_err(|error| format!("{}: {error}", module.display()))?;
-    Ok(standalone_page(
-        &strip_custom_sections(&module),
-        &load_bundle()?,
-    ))
+    Ok(standalone_page(&strip_custom_sections(&module), &load_bundle()?))
 }
 
 /// A module without its custom sections, which contain names and lines for debuggers. A module consists of eight bytes
@@ -110,8 +91,7 @@ fn strip_custom_sections(module: &[u8]) -> Vec<u8> {
     while let [kind, after @ ..] = rest {
         let digits = 1 + after.iter().take_while(|byte| **byte >= 0x80).count();
         let digits = digits.min(after.len());
-        let length =
-            (after[..digits].iter().rev()).fold(0, |n, byte| n << 7 | usize::from(byte & 0x7f));
+        let length = (after[..digits].iter().rev()).fold(0, |n, byte| n << 7 | usize::from(byte & 0x7f));
         let end = rest.len().min(1 + digits + length);
         if *kind != 0 {
             kept.extend(&rest[..end]);

@@ -19,10 +19,7 @@ const FOUND: [&str; 5] = ["verdict", "noise_floor", "budget", "steps", "effects"
 fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
     let Some(module) = module() else { return };
     let bundle = make::load_bundle().expect("models and recordings are there");
-    let recordings = bundle
-        .recordings
-        .iter()
-        .map(|(_, name, text, _)| (name, text));
+    let recordings = bundle.recordings.iter().map(|(_, name, text, _)| (name, text));
     let models = bundle.models.iter().map(|(name, text)| (name, text));
     let files: Vec<(&String, &String)> = models.chain(recordings).collect();
     let open = json!({
@@ -63,15 +60,12 @@ fn node_derives_identifies_and_diagnoses_with_the_same_numbers() {
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}");
     let there: Value = serde_json::from_str(&text).unwrap_or_else(|_| panic!("{text}"));
-    assert!(
-        there["heard"].as_u64() > Some(3),
-        "the diagnosis says how far it is"
-    );
+    assert!(there["heard"].as_u64() > Some(3), "the diagnosis says how far it is");
     let mut numbers = 0;
-    for ((question, _), (here, there)) in questions.iter().zip(
-        here.iter()
-            .zip(there["answers"].as_array().expect("answers")),
-    ) {
+    for ((question, _), (here, there)) in questions
+        .iter()
+        .zip(here.iter().zip(there["answers"].as_array().expect("answers")))
+    {
         let found = "/told/found";
         match (here.pointer(found), there.pointer(found)) {
             (Some(here), Some(there)) => {
@@ -91,10 +85,7 @@ fn module() -> Option<PathBuf> {
     let node = Command::new("node").arg("--version").output().is_ok();
     let no_node = (!node).then(|| "there is no `node` to run WebAssembly".to_owned());
     if let Some(why) = no_node.or_else(make::missing_target) {
-        assert!(
-            std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(),
-            "{why}"
-        );
+        assert!(std::env::var_os("MODELMILL_WASM_REQUIRED").is_none(), "{why}");
         eprintln!("skipped: {why}");
         return None;
     }

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, TestedProgram, in_project, read, run_benchmark, work_off,
-    write,
+    BenchmarkOptions, BenchmarkUsage, TestedProgram, in_project, read, run_benchmark, work_off, write,
 };
 use serde_json::Value;
 
@@ -75,18 +74,13 @@ fn main() -> ExitCode {
 fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let data = in_project("../shared/data");
     let only = options.text("only");
-    let machines: Vec<&Machine> = (MACHINES.iter())
-        .filter(|one| one.name.contains(only))
-        .collect();
+    let machines: Vec<&Machine> = (MACHINES.iter()).filter(|one| one.name.contains(only)).collect();
     let program = options.program()?;
     // One at a time, since each is timed.
     let rows = work_off(&machines, 1, |machine, folder| {
         let mut files = machine.fit.iter().chain(&machine.check);
         if !files.all(|file| data.join(file).is_file()) {
-            return Ok(format!(
-                "{}: there are no recordings beside the project",
-                machine.name
-            ));
+            return Ok(format!("{}: there are no recordings beside the project", machine.name));
         }
         let model = match &machine.model {
             Model::Beside(path) => data.join(path),
@@ -119,8 +113,7 @@ fn bare(models: &Path, name: &str, scratch: &Path) -> Result<PathBuf, String> {
     let whole = model.canonicalize();
     let whole = whole.map_err(|e| format!("{}: {e}", model.display()))?;
     let whole = whole.display().to_string();
-    let text =
-        format!("schema = 1\nname = \"bodies\"\nextends = {whole:?}\nremove = {removed:?}\n");
+    let text = format!("schema = 1\nname = \"bodies\"\nextends = {whole:?}\nremove = {removed:?}\n");
     write(&path, &text)?;
     Ok(path)
 }

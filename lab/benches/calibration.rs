@@ -12,9 +12,7 @@ use std::process::ExitCode;
 
 use modelmill_lab::case::HiddenCase;
 use modelmill_lab::disturbance::DrawnDisturbance;
-use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, WORKERS, run_benchmark, work_off, write,
-};
+use modelmill_lab::harness::{BenchmarkOptions, BenchmarkUsage, WORKERS, run_benchmark, work_off, write};
 use modelmill_lab::outside::OutsideLaw;
 use modelmill_lab::placed::atoms;
 use modelmill_lab::plant::{DRIVES, SpidermillPlant};
@@ -94,8 +92,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         }
     }
     if let Some(path) = options.path("list") {
-        let line =
-            |f: &Finding| format!("{:.4} {} {}\n", f.probability, u8::from(f.is_true), f.says);
+        let line = |f: &Finding| format!("{:.4} {} {}\n", f.probability, u8::from(f.is_true), f.says);
         let text: String = findings.iter().map(line).collect();
         write(path, &text)?;
     }
@@ -107,9 +104,7 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let n = findings.len().max(1) as f64;
     let outcome = |f: &Finding| f64::from(u8::from(f.is_true));
     let share = findings.iter().map(outcome).sum::<f64>() / n;
-    let brier = findings
-        .iter()
-        .map(|f| (f.probability - outcome(f)).powi(2));
+    let brier = findings.iter().map(|f| (f.probability - outcome(f)).powi(2));
     let mut text = format!(
         "seed {seed}, {recordings} pairs of recordings, {} findings, {:.1} % of them true\nBrier score {:.4}; {:.4} for who always \
          says {share:.3}\n\n{:<12}{:>10}{:>12}{:>8}{:>14}\n",
@@ -126,8 +121,7 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
     let mut inside = [0, 0];
     for bin in 0..BINS {
         let [low, high] = [bin, bin + 1].map(|k| k as f64 / BINS as f64);
-        let is_in =
-            |f: &&Finding| f.probability >= low && (f.probability < high || bin + 1 == BINS);
+        let is_in = |f: &&Finding| f.probability >= low && (f.probability < high || bin + 1 == BINS);
         let own: Vec<&Finding> = findings.iter().filter(is_in).collect();
         if own.is_empty() {
             continue;
@@ -147,10 +141,7 @@ fn report(findings: &[Finding], recordings: usize, seed: u64) -> String {
             if holds { "" } else { "  outside" }
         );
     }
-    text + &format!(
-        "{} of {} bins within their binomial intervals\n",
-        inside[0], inside[1]
-    )
+    text + &format!("{} of {} bins within their binomial intervals\n", inside[0], inside[1])
 }
 
 /// The least and the most of so many that come true, each with a probability, all but [`BEYOND`] of the time.

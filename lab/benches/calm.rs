@@ -12,20 +12,14 @@ use modelmill_lab::answer::ProgramAnswer;
 use modelmill_lab::case::{DrawnMasses, RATE, with_masses};
 use modelmill_lab::coloured::{SpectrumFall, noise};
 use modelmill_lab::course::{CourseRepeats, DrawnCourse};
-use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, WORKERS, run_benchmark, work_off, write,
-};
+use modelmill_lab::harness::{BenchmarkOptions, BenchmarkUsage, WORKERS, run_benchmark, work_off, write};
 use modelmill_lab::plant::{DRIVES, PlantMotion, SpidermillPlant};
 use modelmill_lab::random::{CaseRandom, three_digits};
 use modelmill_lab::record::{FILES, RecordedSamples};
 
 /// Deviations of the noise, N.
 const NOISE: [f64; 2] = [0.5, 3.0];
-const REPEATS: [CourseRepeats; 3] = [
-    CourseRepeats::Once,
-    CourseRepeats::Thrice,
-    CourseRepeats::Never,
-];
+const REPEATS: [CourseRepeats; 3] = [CourseRepeats::Once, CourseRepeats::Thrice, CourseRepeats::Never];
 
 /// A recording without anything to find.
 struct Calm {
@@ -37,11 +31,7 @@ struct Calm {
 const USAGE: BenchmarkUsage = BenchmarkUsage {
     line: "cargo bench -p modelmill-lab --bench calm -- [--seeds 10] [--first 1] [--corners white,60,30,15,8,3,1] \
            [--program PATH]",
-    values: &[
-        ("seeds", "10"),
-        ("first", "1"),
-        ("corners", "white,60,30,15,8,3,1"),
-    ],
+    values: &[("seeds", "10"), ("first", "1"), ("corners", "white,60,30,15,8,3,1")],
     switches: &[],
     takes_folder: false,
 };
@@ -52,16 +42,13 @@ fn main() -> ExitCode {
 
 fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let [seeds, first] = [options.number::<u64>("seeds")?, options.number("first")?];
-    let corners = options
-        .text("corners")
-        .split(',')
-        .map(|corner| match corner {
-            "white" => Ok(None),
-            number => number
-                .parse()
-                .map(Some)
-                .map_err(|_| format!("--corners: `{number}` is no number")),
-        });
+    let corners = options.text("corners").split(',').map(|corner| match corner {
+        "white" => Ok(None),
+        number => number
+            .parse()
+            .map(Some)
+            .map_err(|_| format!("--corners: `{number}` is no number")),
+    });
     let corners: Vec<Option<f64>> = corners.collect::<Result<_, String>>()?;
     let plant = SpidermillPlant::load()?;
     let mut cases = Vec::new();
@@ -131,11 +118,7 @@ fn told(answer: &Result<ProgramAnswer, String>) -> String {
     match answer {
         Err(why) => why.clone(),
         Ok(answer) => {
-            let claims: Vec<String> = answer
-                .effects
-                .iter()
-                .map(|c| c.effect.to_string())
-                .collect();
+            let claims: Vec<String> = answer.effects.iter().map(|c| c.effect.to_string()).collect();
             format!(
                 "{} {} | {}",
                 answer.verdict,
@@ -150,14 +133,12 @@ impl Calm {
     /// Fit (0) or check (1) as text.
     fn record(&self, plant: &SpidermillPlant, which: usize) -> Result<String, String> {
         let number = self.corner.map_or(0, f64::to_bits);
-        let stream =
-            |purpose: u64| CaseRandom::new(self.seed, number, purpose + 1000 * self.repeats as u64);
+        let stream = |purpose: u64| CaseRandom::new(self.seed, number, purpose + 1000 * self.repeats as u64);
         let mut random = stream(0);
         let deviation = three_digits(random.log_between(NOISE[0], NOISE[1]));
         let masses = (!self.seed.is_multiple_of(3)).then(|| DrawnMasses::draw(&mut random));
         let rig = with_masses(&plant.rig, masses);
-        let courses =
-            [(); 2].map(|()| DrawnCourse::draw(&mut random, plant.limits(), self.repeats));
+        let courses = [(); 2].map(|()| DrawnCourse::draw(&mut random, plant.limits(), self.repeats));
         let course = &courses[which];
         let along = PlantMotion::new(&rig, course, course.times(RATE))?;
         let fall = if self.seed.is_multiple_of(2) {

@@ -14,8 +14,7 @@ use serde_json::{Map, Value};
 
 use modelmill_lab::case::{HiddenCase, class_of};
 use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, TestedProgram, WORKERS, folder_of_case, run_benchmark,
-    work_off, write,
+    BenchmarkOptions, BenchmarkUsage, TestedProgram, WORKERS, folder_of_case, run_benchmark, work_off, write,
 };
 use modelmill_lab::judge::{self, AnswerMark, CaseClass, judge};
 use modelmill_lab::outside::OutsideLaw;
@@ -61,9 +60,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     let class = match options.text("only") {
         "" => None,
         name => {
-            let class = CaseClass::ALL
-                .into_iter()
-                .find(|class| class.name() == name);
+            let class = CaseClass::ALL.into_iter().find(|class| class.name() == name);
             Some(class.ok_or_else(|| format!("there is no class `{name}`"))?)
         }
     };
@@ -85,14 +82,9 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         list,
         program: program.as_ref(),
     };
-    let done = work_off(&numbers, WORKERS, |number, folder| {
-        inquiry.one(*number, folder)
-    })?;
+    let done = work_off(&numbers, WORKERS, |number, folder| inquiry.one(*number, folder))?;
     if let (Some(keep), false) = (inquiry.keep, list) {
-        let truths: Map<String, Value> = done
-            .iter()
-            .map(|one| (one.name.clone(), one.truth.clone()))
-            .collect();
+        let truths: Map<String, Value> = done.iter().map(|one| (one.name.clone(), one.truth.clone())).collect();
         let text = format!("{:#}\n", Value::Object(truths));
         write(&keep.join("truth.json"), &text)?;
     }
@@ -114,11 +106,7 @@ impl Inquiry<'_> {
         let recording = format!(
             "{}, {}, noise {} N",
             case.repeats.word(),
-            if case.full {
-                "full states"
-            } else {
-                "positions only"
-            },
+            if case.full { "full states" } else { "positions only" },
             case.noise
         );
         let line = format!(
@@ -164,9 +152,7 @@ impl Inquiry<'_> {
         let (answer, mark, aliases) = match answer {
             Err(why) => (None, AnswerMark::Failed(why), [0, 0]),
             Ok(answer) => {
-                let mut excess = |claims: &[PlacedEffect]| {
-                    case.excess(self.plant, claims).unwrap_or(f64::INFINITY)
-                };
+                let mut excess = |claims: &[PlacedEffect]| case.excess(self.plant, claims).unwrap_or(f64::INFINITY);
                 let law = case.outside.as_ref().map(|outside| outside.law);
                 let named = law.and_then(OutsideLaw::disturbance);
                 let mark = judge(case.class, &case.placed(), named, &answer, &mut excess);

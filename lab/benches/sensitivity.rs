@@ -52,12 +52,7 @@ struct Done {
 const USAGE: BenchmarkUsage = BenchmarkUsage {
     line: "cargo bench -p modelmill-lab --bench sensitivity -- [--seeds 6] [--calm 200] [--figure FILE.svg] [--only KIND] \
            [--program PATH]",
-    values: &[
-        ("seeds", "6"),
-        ("calm", "200"),
-        ("figure", ""),
-        ("only", ""),
-    ],
+    values: &[("seeds", "6"), ("calm", "200"), ("figure", ""), ("only", "")],
     switches: &[],
     takes_folder: false,
 };
@@ -72,8 +67,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
     // Of each kind the first place.
     let mut kinds: Vec<HiddenChoice> = Vec::new();
     for choice in choices() {
-        if choice.kind.contains(options.text("only")) && kinds.iter().all(|k| k.kind != choice.kind)
-        {
+        if choice.kind.contains(options.text("only")) && kinds.iter().all(|k| k.kind != choice.kind) {
             kinds.push(choice);
         }
     }
@@ -85,13 +79,8 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         }));
     }
     let program = options.program()?;
-    let done = work_off(&cases, WORKERS, |case, folder| {
-        case.measure(&plant, folder, &program)
-    })?;
-    let quiet = cases
-        .iter()
-        .zip(&done)
-        .filter(|(case, _)| case.kind.is_none());
+    let done = work_off(&cases, WORKERS, |case, folder| case.measure(&plant, folder, &program))?;
+    let quiet = cases.iter().zip(&done).filter(|(case, _)| case.kind.is_none());
     let alarms = quiet.filter(|(_, done)| done.size > 0.0).count();
     // Of a rate that was seen so seldom the middle of what it may be.
     let rate = (alarms as f64 + 0.5) / (calm as f64 + 1.0);
@@ -133,10 +122,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
         );
         rows.push((kind.kind, sizes));
     }
-    let good = rows
-        .iter()
-        .filter(|(_, sizes)| sizes[1] <= TWICE * oracle)
-        .count();
+    let good = rows.iter().filter(|(_, sizes)| sizes[1] <= TWICE * oracle).count();
     println!(
         "\n{good} of {} kinds within {TWICE} times the oracle's; target 12 of 15",
         rows.len()
@@ -148,27 +134,18 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
 }
 
 impl Case {
-    fn measure(
-        &self,
-        plant: &SpidermillPlant,
-        folder: &Path,
-        program: &TestedProgram,
-    ) -> Result<Done, String> {
+    fn measure(&self, plant: &SpidermillPlant, folder: &Path, program: &TestedProgram) -> Result<Done, String> {
         let name = self.kind.as_ref().map_or("nothing", |kind| kind.kind);
         let number = name
             .bytes()
             .fold(0, |n: u64, b| n.wrapping_mul(131).wrapping_add(b.into()));
         let mut random = CaseRandom::new(self.seed, number, 0);
-        let courses =
-            [(); 2].map(|()| DrawnCourse::draw(&mut random, plant.limits(), CourseRepeats::Once));
+        let courses = [(); 2].map(|()| DrawnCourse::draw(&mut random, plant.limits(), CourseRepeats::Once));
         let mut alongs = Vec::new();
         for course in &courses {
             alongs.push(PlantMotion::new(&plant.rig, course, course.times(RATE))?);
         }
-        let hidden = self
-            .kind
-            .as_ref()
-            .map_or_else(Vec::new, |kind| kind.draw(&mut random));
+        let hidden = self.kind.as_ref().map_or_else(Vec::new, |kind| kind.draw(&mut random));
         let mut added = Vec::new();
         for (along, course) in alongs.iter().zip(&courses) {
             added.push(added_by(&hidden, along, course)?);
@@ -189,16 +166,8 @@ impl Case {
             for which in 0..2 {
                 let forces = alongs[which].plain.iter().zip(&added[which]);
                 let forces: Vec<f64> = forces.map(|(f, a)| f + factor * a).collect();
-                let encoder = |k: usize| {
-                    CaseRandom::new(self.seed, number, 200 + 10 * which as u64 + k as u64)
-                };
-                let samples = RecordedSamples::new(
-                    &alongs[which],
-                    &forces,
-                    noises[which].clone(),
-                    encoder,
-                    false,
-                );
+                let encoder = |k: usize| CaseRandom::new(self.seed, number, 200 + 10 * which as u64 + k as u64);
+                let samples = RecordedSamples::new(&alongs[which], &forces, noises[which].clone(), encoder, false);
                 write(&files[which], &samples.recorded().csv)?;
             }
             program.diagnose(&plant.model, &files).0
@@ -239,10 +208,7 @@ impl Case {
             }
         }
         let size = (low * high).sqrt();
-        let sized: Vec<String> = hidden
-            .iter()
-            .map(|one| one.times(size / unit).to_string())
-            .collect();
+        let sized: Vec<String> = hidden.iter().map(|one| one.times(size / unit).to_string()).collect();
         Ok(Done {
             size,
             value: sized.join(", "),
@@ -302,18 +268,11 @@ fn lesser(hidden: &[HiddenEffect]) -> Vec<PlacedEffect> {
 
 /// What bends the curve of what is hidden.
 fn constant(hidden: &[HiddenEffect]) -> f64 {
-    hidden
-        .iter()
-        .find_map(HiddenEffect::constant)
-        .unwrap_or(1.0)
+    hidden.iter().find_map(HiddenEffect::constant).unwrap_or(1.0)
 }
 
 /// What effects of unit size add to the forces. A delay has no size but its own: what it changes by each of its seconds.
-fn added_by(
-    hidden: &[HiddenEffect],
-    along: &PlantMotion,
-    course: &DrawnCourse,
-) -> Result<Vec<f64>, String> {
+fn added_by(hidden: &[HiddenEffect], along: &PlantMotion, course: &DrawnCourse) -> Result<Vec<f64>, String> {
     if hidden.iter().any(|one| one.delay() > 0.0) {
         let at = |by: f64| {
             let times = along.times.iter().map(|t| t - by).collect();
@@ -326,8 +285,7 @@ fn added_by(
             .map(|(a, b)| (a - b) / (2.0 * SHORT))
             .collect());
     }
-    let effects: Result<Vec<_>, String> =
-        hidden.iter().map(|one| one.effect(along.rig())).collect();
+    let effects: Result<Vec<_>, String> = hidden.iter().map(|one| one.effect(along.rig())).collect();
     along.added(&effects?)
 }
 

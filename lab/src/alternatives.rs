@@ -94,12 +94,7 @@ impl HiddenCase {
     }
 
     /// Whether least squares give a value that must be positive a negative one, by more than the noise could.
-    fn has_wrong_sign(
-        &self,
-        base: &[Vec<f64>],
-        claimed: &[(Vec<f64>, bool)],
-        total: &[f64],
-    ) -> bool {
+    fn has_wrong_sign(&self, base: &[Vec<f64>], claimed: &[(Vec<f64>, bool)], total: &[f64]) -> bool {
         claimed.iter().enumerate().any(|(k, (column, positive))| {
             if !positive {
                 return false;
@@ -128,12 +123,7 @@ impl HiddenCase {
             // What holds the truth among other things is no double of it.
             let holds = |(kind, place): &EffectAtom| {
                 let mut less = vec![kind.as_str()];
-                less.extend(
-                    HOLDS
-                        .iter()
-                        .filter(|(more, _)| more == kind)
-                        .map(|(_, l)| *l),
-                );
+                less.extend(HOLDS.iter().filter(|(more, _)| more == kind).map(|(_, l)| *l));
                 less.iter()
                     .any(|kind| truth.contains(&((*kind).to_owned(), place.clone())))
             };

@@ -51,11 +51,7 @@ impl ProgramAnswer {
         let steps = list(value, "steps")?.iter().map(|step| {
             let added = &step["added"];
             Ok(ProgramStep {
-                added: if added.is_null() {
-                    None
-                } else {
-                    Some(placed(added)?)
-                },
+                added: if added.is_null() { None } else { Some(placed(added)?) },
                 fit: number(step, "fit")?,
                 check: number(step, "check")?,
             })
@@ -88,9 +84,7 @@ impl ProgramAnswer {
 }
 
 fn list<'a>(value: &'a Value, key: &str) -> Result<&'a Vec<Value>, String> {
-    value[key]
-        .as_array()
-        .ok_or_else(|| format!("`{key}` is no list"))
+    value[key].as_array().ok_or_else(|| format!("`{key}` is no list"))
 }
 
 fn number(value: &Value, key: &str) -> Result<f64, String> {

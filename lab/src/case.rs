@@ -93,10 +93,7 @@ pub struct HiddenCase {
 pub fn class_of(number: u64) -> (CaseClass, u64) {
     let at = |n: u64| PATTERN[usize::try_from((n - 1) % PATTERN.len() as u64).unwrap_or(0)];
     let class = at(number);
-    (
-        class,
-        (1..number).filter(|n| at(*n) == class).count() as u64,
-    )
+    (class, (1..number).filter(|n| at(*n) == class).count() as u64)
 }
 
 impl HiddenCase {
@@ -116,8 +113,7 @@ impl HiddenCase {
         } else {
             three_digits(random.log_between(0.5, 3.0))
         };
-        let masses =
-            (class == CaseClass::None && before % 3 != 0).then(|| DrawnMasses::draw(&mut random));
+        let masses = (class == CaseClass::None && before % 3 != 0).then(|| DrawnMasses::draw(&mut random));
         let rig = with_masses(&plant.rig, masses);
         let courses = [(); 2].map(|()| DrawnCourse::draw(&mut random, plant.limits(), repeats));
         let along = |course: &DrawnCourse| PlantMotion::new(&rig, course, course.times(COARSE));
@@ -153,10 +149,7 @@ impl HiddenCase {
 
     /// Kinds and places that are hidden.
     pub fn placed(&self) -> Vec<PlacedEffect> {
-        self.hidden
-            .iter()
-            .map(|hidden| hidden.placed.clone())
-            .collect()
+        self.hidden.iter().map(|hidden| hidden.placed.clone()).collect()
     }
 
     /// What is hidden, in words.
@@ -183,11 +176,8 @@ impl HiddenCase {
             .map(|one| json!({ "kind": one.kind, "at": one.at }))
             .collect();
         let hidden = self.hidden.iter().map(|one| {
-            let values: serde_json::Map<String, Value> = one
-                .values
-                .iter()
-                .map(|(s, v)| ((*s).to_owned(), json!(v)))
-                .collect();
+            let values: serde_json::Map<String, Value> =
+                one.values.iter().map(|(s, v)| ((*s).to_owned(), json!(v))).collect();
             json!({ "kind": one.placed.kind, "at": one.placed.at, "values": values })
         });
         let hidden: Vec<Value> = hidden.collect();
@@ -250,8 +240,7 @@ impl HiddenCase {
                     let choice = &all[pick(2, turn, all.len())];
                     let other = &all[random.below(all.len())];
                     self.label = format!("{} + {}", choice.kind, other.kind);
-                    !would_merge(choice, other)
-                        && self.hide_effects(&[choice, other], &mut random, &spans)?
+                    !would_merge(choice, other) && self.hide_effects(&[choice, other], &mut random, &spans)?
                 }
                 _ => {
                     let law = OutsideLaw::ALL[pick(3, turn, OutsideLaw::ALL.len())];
@@ -263,10 +252,7 @@ impl HiddenCase {
                 return Ok(());
             }
         }
-        Err(format!(
-            "case {}: nothing that shows was found",
-            self.number
-        ))
+        Err(format!("case {}: nothing that shows was found", self.number))
     }
 
     fn hide_effects(
@@ -292,12 +278,7 @@ impl HiddenCase {
     }
 
     /// The effects at a size that causes a given error on the fit; `None` if a machine cannot have that much.
-    fn sized(
-        &self,
-        unit: &[HiddenEffect],
-        error: f64,
-        span: &ColumnSpan,
-    ) -> Result<Option<Vec<HiddenEffect>>, String> {
+    fn sized(&self, unit: &[HiddenEffect], error: f64, span: &ColumnSpan) -> Result<Option<Vec<HiddenEffect>>, String> {
         let along = &self.coarse[0];
         let plain = &along.plain;
         if unit.iter().all(|one| !one.has_size()) {
@@ -320,18 +301,10 @@ impl HiddenCase {
         let most = most.fold(f64::INFINITY, f64::min);
         let mut factor = 0.0;
         for _ in 0..50 {
-            let force: Vec<f64> = plain
-                .iter()
-                .zip(&added)
-                .map(|(f, a)| f + factor * a)
-                .collect();
+            let force: Vec<f64> = plain.iter().zip(&added).map(|(f, a)| f + factor * a).collect();
             factor = (error * rms(&force) / shown).min(most);
         }
-        let force: Vec<f64> = plain
-            .iter()
-            .zip(&added)
-            .map(|(f, a)| f + factor * a)
-            .collect();
+        let force: Vec<f64> = plain.iter().zip(&added).map(|(f, a)| f + factor * a).collect();
         let enough = factor * shown >= LEAST_ERROR * rms(&force);
         Ok(enough.then(|| unit.iter().map(|one| one.times(factor)).collect()))
     }
@@ -381,30 +354,19 @@ impl HiddenCase {
             return Ok(vec![self.delay_column(0)?]);
         }
         let constant = hidden.constant().unwrap_or(1.0);
-        columns(
-            &self.coarse[0],
-            &hidden.placed,
-            constant,
-            &self.masses_hidden()?,
-        )
-        .ok_or_else(|| format!("no columns of {}", hidden.placed))
+        columns(&self.coarse[0], &hidden.placed, constant, &self.masses_hidden()?)
+            .ok_or_else(|| format!("no columns of {}", hidden.placed))
     }
 
     /// Hidden effects with mass, which friction by load feels.
     pub fn masses_hidden(&self) -> Result<Vec<RigEffect>, String> {
-        let massive = |one: &&HiddenEffect| {
-            ["point_mass", "rod_inertia", "gravity_tilt"].contains(&one.placed.kind.as_str())
-        };
+        let massive =
+            |one: &&HiddenEffect| ["point_mass", "rod_inertia", "gravity_tilt"].contains(&one.placed.kind.as_str());
         let effects = self.hidden.iter().filter(massive);
         effects.map(|one| one.effect(&self.rig)).collect()
     }
 
-    fn hide_outside(
-        &mut self,
-        law: OutsideLaw,
-        random: &mut CaseRandom,
-        spans: &[ColumnSpan; 2],
-    ) -> bool {
+    fn hide_outside(&mut self, law: OutsideLaw, random: &mut CaseRandom, spans: &[ColumnSpan; 2]) -> bool {
         let along = &self.coarse[0];
         let unit = OutsideForce::draw(law, random);
         let error = random.log_between(ERRORS[0], ERRORS[1]);
@@ -420,10 +382,7 @@ impl HiddenCase {
             (share, rms(&all.rest(&added)) / self.noise)
         };
         // Sizes from small to large; cutting works the other way round.
-        let peak = along
-            .plain
-            .iter()
-            .fold(0.0_f64, |most, f| most.max(f.abs()));
+        let peak = along.plain.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let (start, step) = if law == OutsideLaw::Saturation {
             (peak, 0.97)
         } else {
@@ -456,11 +415,7 @@ impl HiddenCase {
     fn added(&self, which: usize) -> Result<Vec<f64>, String> {
         let along = &self.coarse[which];
         let forces = self.forces(along, &self.courses[which])?;
-        Ok(forces
-            .iter()
-            .zip(&along.plain)
-            .map(|(a, b)| a - b)
-            .collect())
+        Ok(forces.iter().zip(&along.plain).map(|(a, b)| a - b).collect())
     }
 
     /// True forces as they are read without noise.
@@ -509,8 +464,7 @@ fn would_merge(one: &HiddenChoice, other: &HiddenChoice) -> bool {
     let offsets = |a: &HiddenChoice, b: &HiddenChoice| {
         a.kind == "directional_coulomb_friction" && ["force_offset", "spring"].contains(&b.kind)
     };
-    let same =
-        one.kind == other.kind || (family(one.kind) > 0 && family(one.kind) == family(other.kind));
+    let same = one.kind == other.kind || (family(one.kind) > 0 && family(one.kind) == family(other.kind));
     shared && (same || offsets(one, other) || offsets(other, one))
 }
 

@@ -59,7 +59,5 @@ pub fn noise(
         step(&mut state, random.normal());
         settles -= 1.0;
     }
-    (0..samples)
-        .map(|_| gain * step(&mut state, random.normal()))
-        .collect()
+    (0..samples).map(|_| gain * step(&mut state, random.normal())).collect()
 }

@@ -31,9 +31,8 @@ pub fn columns(
     };
     let at = placed.at.as_slice();
     let kind = placed.kind.as_str();
-    let with = |all: &[&[(&str, f64)]]| -> Option<Vec<Vec<f64>>> {
-        all.iter().map(|values| of(kind, at, values)).collect()
-    };
+    let with =
+        |all: &[&[(&str, f64)]]| -> Option<Vec<Vec<f64>>> { all.iter().map(|values| of(kind, at, values)).collect() };
     let masses = |points: [&str; 3]| -> Option<Vec<Vec<f64>>> {
         let column = |p: &str| of("point_mass", &[p.to_owned()], &[("m", 1.0)]);
         points.into_iter().map(column).collect()
@@ -44,12 +43,8 @@ pub fn columns(
         "stribeck_friction" => with(&[&[("Fs", 1.0), ("vs", constant)]]),
         "quadratic_friction" => with(&[&[("Fq", 1.0)]]),
         "load_friction" => with(&[&[("mu", 1.0)]]),
-        "directional_viscous_friction" => {
-            with(&[&[("Fvp", 1.0), ("Fvn", 0.0)], &[("Fvp", 0.0), ("Fvn", 1.0)]])
-        }
-        "directional_coulomb_friction" => {
-            with(&[&[("Fcp", 1.0), ("Fcn", 0.0)], &[("Fcp", 0.0), ("Fcn", 1.0)]])
-        }
+        "directional_viscous_friction" => with(&[&[("Fvp", 1.0), ("Fvn", 0.0)], &[("Fvp", 0.0), ("Fvn", 1.0)]]),
+        "directional_coulomb_friction" => with(&[&[("Fcp", 1.0), ("Fcn", 0.0)], &[("Fcp", 0.0), ("Fcn", 1.0)]]),
         "drive_inertia" => with(&[&[("Ia", 1.0)]]),
         "force_offset" => with(&[&[("F0", 1.0)]]),
         "spring" => Some(
@@ -59,10 +54,7 @@ pub fn columns(
             ]
             .concat(),
         ),
-        "force_ripple" => with(&[
-            &[("As", 1.0), ("pitch", constant)],
-            &[("Ac", 1.0), ("pitch", constant)],
-        ]),
+        "force_ripple" => with(&[&[("As", 1.0), ("pitch", constant)], &[("Ac", 1.0), ("pitch", constant)]]),
         // Sine and cosine of the coordinate.
         "counterbalance" => ["As", "Ac"]
             .iter()
@@ -99,8 +91,8 @@ pub fn columns(
 pub fn must_be_positive(kind: &str) -> &'static [bool] {
     match kind {
         "directional_viscous_friction" | "directional_coulomb_friction" => &[true, true],
-        "force_offset" | "force_ripple" | "counterbalance" | "coupled_drive" | "rod_inertia"
-        | "gravity_tilt" | "untied_part" => &[],
+        "force_offset" | "force_ripple" | "counterbalance" | "coupled_drive" | "rod_inertia" | "gravity_tilt"
+        | "untied_part" => &[],
         // Of a spring the stiffness only, its rest being anywhere.
         _ => &[true],
     }
@@ -110,9 +102,7 @@ pub fn must_be_positive(kind: &str) -> &'static [bool] {
 pub fn constants(kind: &str) -> Vec<f64> {
     let geometric = |low: f64, high: f64, n: i32| -> Vec<f64> {
         let step = libm::log(high / low) / f64::from(n - 1);
-        (0..n)
-            .map(|k| low * libm::exp(step * f64::from(k)))
-            .collect()
+        (0..n).map(|k| low * libm::exp(step * f64::from(k))).collect()
     };
     match kind {
         "stribeck_friction" => geometric(0.005, 0.2, 20),

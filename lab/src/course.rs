@@ -86,11 +86,11 @@ impl DrawnCourse {
         };
         let mut frequencies = Vec::new();
         for k in 1..=HARMONICS {
-            let stretch = match repeats {
+            let segment = match repeats {
                 CourseRepeats::Never => 1.0 + 0.08 * random.normal().clamp(-2.0, 2.0),
                 _ => 1.0,
             };
-            frequencies.push(f64::from(k) * stretch * 2.0 * PI / PERIOD);
+            frequencies.push(f64::from(k) * segment * 2.0 * PI / PERIOD);
         }
         let sums = limits.coordinates.iter().map(|(_, of_one)| {
             let fill = random.uniform_between(0.75, 0.97);
@@ -101,8 +101,7 @@ impl DrawnCourse {
             };
             for (k, w) in (1..).zip(&frequencies) {
                 let size = 1.0 / f64::from(k);
-                sum.terms
-                    .push([*w, size * random.normal(), size * random.normal()]);
+                sum.terms.push([*w, size * random.normal(), size * random.normal()]);
             }
             let ends = |sum: &HarmonicSum, derivative: usize| {
                 let times = (0..CHECKS).map(|i| duration * i as f64 / CHECKS as f64);

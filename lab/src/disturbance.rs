@@ -47,11 +47,7 @@ pub enum DrawnDisturbance {
     /// A force that reads too much by a part.
     Scale { drive: usize, part: f64 },
     /// An encoder that errs a few times a turn, rad.
-    Eccentric {
-        coordinate: usize,
-        size: f64,
-        times: u8,
-    },
+    Eccentric { coordinate: usize, size: f64, times: u8 },
     /// Steps of time that are uneven by a part, adding up, stamped as if even.
     Jitter { part: f64 },
     /// Friction of the check run is lower by a part.
@@ -140,15 +136,9 @@ impl DrawnDisturbance {
     }
 
     /// Records fit (0) or check (1) of a case with it.
-    pub fn record(
-        self,
-        case: &HiddenCase,
-        seed: u64,
-        which: usize,
-    ) -> Result<RecordingText, String> {
+    pub fn record(self, case: &HiddenCase, seed: u64, which: usize) -> Result<RecordingText, String> {
         let course = &case.courses[which];
-        let stream =
-            |purpose: u64| CaseRandom::new(seed, case.number, 300 + 50 * which as u64 + purpose);
+        let stream = |purpose: u64| CaseRandom::new(seed, case.number, 300 + 50 * which as u64 + purpose);
         let mut random = stream(0);
         let stamps = course.times(RATE);
         let times = match self {
@@ -192,10 +182,7 @@ impl DrawnDisturbance {
             }
             Self::Lag { corner } => {
                 for d in 0..DRIVES.len() {
-                    lag(
-                        forces.iter_mut().skip(d).step_by(DRIVES.len()),
-                        RATE / (TAU * corner),
-                    );
+                    lag(forces.iter_mut().skip(d).step_by(DRIVES.len()), RATE / (TAU * corner));
                 }
             }
             Self::Payload { mass } if which == 1 => {
@@ -216,13 +203,7 @@ impl DrawnDisturbance {
                         Self::Coloured { corner, fall } => Some((corner, fall)),
                         _ => None,
                     };
-                    noise(
-                        &mut stream(10 + k as u64),
-                        along.times.len(),
-                        RATE,
-                        case.noise,
-                        colour,
-                    )
+                    noise(&mut stream(10 + k as u64), along.times.len(), RATE, case.noise, colour)
                 })
                 .collect(),
             |k| stream(20 + k as u64),

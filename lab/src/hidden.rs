@@ -17,12 +17,7 @@ pub struct HiddenEffect {
 }
 
 impl HiddenEffect {
-    fn new(
-        kind: &str,
-        at: &[&str],
-        scaled: &[(&'static str, f64)],
-        fixed: &[(&'static str, f64)],
-    ) -> Self {
+    fn new(kind: &str, at: &[&str], scaled: &[(&'static str, f64)], fixed: &[(&'static str, f64)]) -> Self {
         Self {
             placed: PlacedEffect::new(kind, at),
             values: [scaled, fixed].concat(),
@@ -59,35 +54,20 @@ impl HiddenEffect {
 
     /// The delay of the forces, s.
     pub fn delay(&self) -> f64 {
-        let of = self
-            .values
-            .iter()
-            .find(|_| self.placed.kind == "time_delay");
+        let of = self.values.iter().find(|_| self.placed.kind == "time_delay");
         of.map_or(0.0, |(_, value)| *value)
     }
 }
 
 impl std::fmt::Display for HiddenEffect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let values = self
-            .values
-            .iter()
-            .map(|(symbol, value)| format!("{symbol}={value}"));
-        write!(
-            f,
-            "{} ({})",
-            self.placed,
-            values.collect::<Vec<_>>().join(", ")
-        )
+        let values = self.values.iter().map(|(symbol, value)| format!("{symbol}={value}"));
+        write!(f, "{} ({})", self.placed, values.collect::<Vec<_>>().join(", "))
     }
 }
 
 /// An effect of the rig by names.
-pub fn effect(
-    rig: &Rig,
-    placed: &PlacedEffect,
-    values: &[(&str, f64)],
-) -> Result<RigEffect, String> {
+pub fn effect(rig: &Rig, placed: &PlacedEffect, values: &[(&str, f64)]) -> Result<RigEffect, String> {
     let at: Vec<&str> = placed.at.iter().map(String::as_str).collect();
     rig.effect(&placed.kind, &at, values).map_err(|faults| {
         let says: Vec<String> = faults.iter().map(ToString::to_string).collect();
@@ -128,20 +108,11 @@ pub fn choices() -> Vec<HiddenChoice> {
         ("coupled_drive", &[BOTH]),
     ];
     let elsewhere: [(&str, &[&[&str]]); 5] = [
-        (
-            "point_mass",
-            &[&["R2m"], &["R4m"], &["A_left"], &["A_right"]],
-        ),
+        ("point_mass", &[&["R2m"], &["R4m"], &["A_left"], &["A_right"]]),
         ("gravity_tilt", &[&["base"]]),
         ("time_delay", &[&["force"]]),
-        (
-            "viscous_friction",
-            &[&["gamma1"], &["gamma2"], &["gamma1", "gamma2"]],
-        ),
-        (
-            "coulomb_friction",
-            &[&["gamma1"], &["gamma2"], &["gamma1", "gamma2"]],
-        ),
+        ("viscous_friction", &[&["gamma1"], &["gamma2"], &["gamma1", "gamma2"]]),
+        ("coulomb_friction", &[&["gamma1"], &["gamma2"], &["gamma1", "gamma2"]]),
     ];
     let all = of_drives.into_iter().chain(elsewhere);
     all.flat_map(|(kind, places)| places.iter().map(move |at| HiddenChoice { kind, at }))
@@ -221,8 +192,7 @@ impl HiddenChoice {
                 &[("rest", three_digits(random.uniform_between(0.5, 0.95)))],
             ),
             "force_ripple" => {
-                let (sin, cos) =
-                    libm::sincos(random.uniform_between(0.0, 2.0 * std::f64::consts::PI));
+                let (sin, cos) = libm::sincos(random.uniform_between(0.0, 2.0 * std::f64::consts::PI));
                 let pitch = three_digits(random.log_between(0.008, 0.1));
                 one(&[("As", sin), ("Ac", cos)], &[("pitch", pitch)])
             }
@@ -235,10 +205,7 @@ impl HiddenChoice {
                 )
             }
             "gravity_tilt" => one(&[("tz", 0.01 * random.sign())], &[]),
-            "time_delay" => one(
-                &[],
-                &[("T", three_digits(random.uniform_between(0.002, 0.012)))],
-            ),
+            "time_delay" => one(&[], &[("T", three_digits(random.uniform_between(0.002, 0.012)))]),
             "coupled_drive" => {
                 let parts = [("Ia", 30.0), ("Fv", 150.0), ("Fs", 20.0)];
                 let always = random.below(parts.len());

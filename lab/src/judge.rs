@@ -124,10 +124,7 @@ pub fn judge(
         }
         CaseClass::Outside => match answer.verdict.as_str() {
             "unexplained" => AnswerMark::Right,
-            "adequate"
-                if disturbance
-                    .is_some_and(|kind| answer.disturbances.iter().any(|one| one == kind)) =>
-            {
+            "adequate" if disturbance.is_some_and(|kind| answer.disturbances.iter().any(|one| one == kind)) => {
                 AnswerMark::Right
             }
             "adequate" => AnswerMark::Overlooked,
@@ -194,9 +191,8 @@ fn mark_answer(
     {
         return AnswerMark::Alias;
     }
-    let kinds = |set: &BTreeSet<&EffectAtom>| -> BTreeSet<String> {
-        set.iter().map(|(kind, _)| kind.clone()).collect()
-    };
+    let kinds =
+        |set: &BTreeSet<&EffectAtom>| -> BTreeSet<String> { set.iter().map(|(kind, _)| kind.clone()).collect() };
     if kinds(&lacking) == kinds(&others) {
         AnswerMark::WrongPlace
     } else {
@@ -206,10 +202,7 @@ fn mark_answer(
 
 /// How many aliases an answer names, and how many of them leave no more of the true forces than the claims themselves
 /// would, so that nobody could tell them apart.
-pub fn aliases(
-    answer: &ProgramAnswer,
-    excess: &mut dyn FnMut(&[PlacedEffect]) -> f64,
-) -> [usize; 2] {
+pub fn aliases(answer: &ProgramAnswer, excess: &mut dyn FnMut(&[PlacedEffect]) -> f64) -> [usize; 2] {
     let claims: Vec<PlacedEffect> = answer.effects.iter().map(|c| c.effect.clone()).collect();
     let mut counts = [0, 0];
     if answer.effects.iter().all(|claim| claim.aliases.is_empty()) {

@@ -80,18 +80,8 @@ impl OutsideLaw {
 
 impl std::fmt::Display for OutsideForce {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            law,
-            at,
-            size,
-            shape,
-        } = self;
-        write!(
-            f,
-            "{} at {} (size {size}, shape {shape})",
-            law.name(),
-            DRIVES[*at]
-        )
+        let Self { law, at, size, shape } = self;
+        write!(f, "{} at {} (size {size}, shape {shape})", law.name(), DRIVES[*at])
     }
 }
 
@@ -144,9 +134,7 @@ impl OutsideForce {
                     block = block.clamp(l.value - self.shape, l.value + self.shape);
                     (l.value - block) / self.shape
                 }
-                OutsideLaw::FrictionByPlace => {
-                    (1.0 + libm::sin(2.0 * PI * self.shape * l.value)) * l.rate
-                }
+                OutsideLaw::FrictionByPlace => (1.0 + libm::sin(2.0 * PI * self.shape * l.value)) * l.rate,
                 OutsideLaw::Stop => (l.value - self.shape).max(0.0),
                 OutsideLaw::Saturation => {
                     let force = along.plain[row];

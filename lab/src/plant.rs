@@ -68,18 +68,13 @@ impl SpidermillPlant {
             .rig;
         let model = specs.join("models").join("spidermill.toml");
         let loaded = modelmill_spec::load_file(&model).map_err(|failure| failure.render(false))?;
-        let derivation =
-            modelmill_codegen::derive(&loaded.mechanism).map_err(|error| error.to_string())?;
+        let derivation = modelmill_codegen::derive(&loaded.mechanism).map_err(|error| error.to_string())?;
         let of_model = derivation.mechanism.drives.iter().map(|d| d.name.as_str());
         let of_rig = rig.drives.iter().map(|d| d.name.as_str());
         if !of_model.eq(DRIVES) || !of_rig.eq(DRIVES) {
             return Err("rig and model name their drives otherwise".to_owned());
         }
-        Ok(Self {
-            rig,
-            derivation,
-            model,
-        })
+        Ok(Self { rig, derivation, model })
     }
 
     /// What motions keep.
@@ -145,11 +140,7 @@ impl PlantMotion {
     }
 
     /// What an effect adds to the forces that others need already, N.
-    pub fn added_beside(
-        &self,
-        others: &[RigEffect],
-        effect: RigEffect,
-    ) -> Result<Vec<f64>, String> {
+    pub fn added_beside(&self, others: &[RigEffect], effect: RigEffect) -> Result<Vec<f64>, String> {
         let without = self.forces(others)?;
         let with = self.forces(&[others, &[effect]].concat())?;
         Ok(with.iter().zip(&without).map(|(a, b)| a - b).collect())
@@ -171,9 +162,8 @@ impl PlantMotion {
         let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
             self.states.iter().map(|state| of(state)[k]).collect()
         };
-        let all = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
-            (0..DRIVES.len()).map(|k| column(of, k)).collect()
-        };
+        let all =
+            |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> { (0..DRIVES.len()).map(|k| column(of, k)).collect() };
         let [q, qd, qdd] = [all(|s| &s.q), all(|s| &s.qd), all(|s| &s.qdd)];
         let states = MotionStates {
             q: slices(&q),

@@ -114,9 +114,7 @@ pub fn record(case: &HiddenCase, seed: u64, which: usize) -> Result<RecordingTex
     let course = &case.courses[which];
     let along = PlantMotion::new(&case.rig, course, course.times(RATE))?;
     let truth = case.forces(&along, course)?;
-    let random = |channel: usize| {
-        CaseRandom::new(seed, case.number, 10 + 10 * which as u64 + channel as u64)
-    };
+    let random = |channel: usize| CaseRandom::new(seed, case.number, 10 + 10 * which as u64 + channel as u64);
     let noise = (0..DRIVES.len()).map(|k| {
         let mut random = random(DRIVES.len() + k);
         let normal = (0..along.times.len()).map(|_| case.noise * random.normal());

@@ -99,8 +99,7 @@ pub fn report(scores: &[CaseScore], seed: u64) -> String {
     let unexplained = |s: &&CaseScore| s.class == CaseClass::Outside && s.mark.is_right();
     let outside: Vec<&CaseScore> = scores.iter().filter(unexplained).collect();
     if !outside.is_empty() {
-        let located =
-            |s: &&&CaseScore| s.answer.as_ref().and_then(|a| a.channel.as_deref()) == s.drive;
+        let located = |s: &&&CaseScore| s.answer.as_ref().and_then(|a| a.channel.as_deref()) == s.drive;
         let _ = writeln!(
             text,
             "located  {} of {} unexplained ones first of all in the drive that feels them",
@@ -109,10 +108,7 @@ pub fn report(scores: &[CaseScore], seed: u64) -> String {
         );
     }
     let [named, honest] = [0, 1].map(|k| scores.iter().map(|s| s.aliases[k]).sum::<usize>());
-    let by_alias = scores
-        .iter()
-        .filter(|s| s.mark == AnswerMark::Alias)
-        .count();
+    let by_alias = scores.iter().filter(|s| s.mark == AnswerMark::Alias).count();
     let _ = writeln!(
         text,
         "aliases  {honest} of {named} that were named cannot be told apart by anybody; {by_alias} cases right by an alias"

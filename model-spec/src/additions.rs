@@ -61,9 +61,7 @@ impl LoadedModel {
             entries: Vec::new(),
             faulty: Vec::new(),
         });
-        let further = constants
-            .iter()
-            .map(|one| (key(&one.name), constant(one, &mut log)));
+        let further = constants.iter().map(|one| (key(&one.name), constant(one, &mut log)));
         table.entries.extend(further);
         let list = model.effect.get_or_insert_with(|| EntryList {
             entries: Vec::new(),
@@ -107,10 +105,7 @@ fn constant(constant: &ModelConstant, log: &mut DiagnosticLog) -> ConstantEntry 
             span: NOWHERE,
         }),
         unit: ModelUnit::from_text(&constant.unit, NOWHERE, None, log),
-        note: constant.note.clone().map(|text| SpannedText {
-            text,
-            span: NOWHERE,
-        }),
+        note: constant.note.clone().map(|text| SpannedText { text, span: NOWHERE }),
         faulty: false,
     }
 }
@@ -135,9 +130,7 @@ fn effect(added: &AddedEffect, log: &mut DiagnosticLog) -> EffectEntry {
             span: NOWHERE,
         }),
         parameters: Some(NamedEntries {
-            entries: parameters
-                .map(|(symbol, name)| (key(symbol), named(name)))
-                .collect(),
+            entries: parameters.map(|(symbol, name)| (key(symbol), named(name))).collect(),
             faulty: Vec::new(),
         }),
         // Without values of its own the effect has no table of constants, so that it is compared with its twins.

@@ -23,11 +23,7 @@ const SYMBOLS: [SymbolSort; 2] = [SymbolSort::Constant, SymbolSort::Coordinate];
 /// Reads an angle over constants with unit rad and coordinates.
 ///
 /// `None` after a fault: an unknown name, a constant that is not an angle, or another shape.
-pub(crate) fn angle(
-    formula: &SourceFormula,
-    scope: &FormulaScope,
-    log: &mut DiagnosticLog,
-) -> Option<ExactAngle> {
+pub(crate) fn angle(formula: &SourceFormula, scope: &FormulaScope, log: &mut DiagnosticLog) -> Option<ExactAngle> {
     let before = log.n_errors();
     let wanted = FormulaRequirement {
         sorts: &SYMBOLS,
@@ -39,10 +35,7 @@ pub(crate) fn angle(
     if log.n_errors() > before {
         // Constants that are not angles are reported by now; unknown names are added.
         let mut rest = DiagnosticLog::default();
-        if scope
-            .resolve_ast(&formula.ast, &SYMBOLS, &mut rest)
-            .is_none()
-        {
+        if scope.resolve_ast(&formula.ast, &SYMBOLS, &mut rest).is_none() {
             for found in rest.finish() {
                 log.push(found);
             }
@@ -130,9 +123,7 @@ fn check_angle_symbols(ast: &FormulaAst, scope: &FormulaScope, log: &mut Diagnos
             check_angle_symbols(above, scope, log);
             check_angle_symbols(below, scope, log);
         }
-        FormulaAstKind::Negative(inner)
-        | FormulaAstKind::Power(inner, _)
-        | FormulaAstKind::Apply(_, inner) => {
+        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
             check_angle_symbols(inner, scope, log);
         }
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => {}
@@ -240,11 +231,8 @@ pub(crate) fn length(
     // The offset is a list of terms here, and one expression below.
     if !split_length(&exact, &BigRational::one(), &mut offset, &mut coordinates) {
         log.push(
-            Diagnostic::error(
-                formula.ast.span,
-                "a joint's length must be linear in its coordinates",
-            )
-            .label("expected for example `q3`, or `d3 + 2*q3`"),
+            Diagnostic::error(formula.ast.span, "a joint's length must be linear in its coordinates")
+                .label("expected for example `q3`, or `d3 + 2*q3`"),
         );
         return None;
     }
@@ -281,9 +269,7 @@ fn split_length(
             *coordinates.entry(*coordinate).or_default() += factor;
             true
         }
-        ExactExpression::Sum(terms) => terms
-            .iter()
-            .all(|term| split_length(term, factor, offset, coordinates)),
+        ExactExpression::Sum(terms) => terms.iter().all(|term| split_length(term, factor, offset, coordinates)),
         ExactExpression::Negative(inner) => split_length(inner, &-factor, offset, coordinates),
         // Rational members join the factor; at most one other member may remain.
         ExactExpression::Product(factors) => {
@@ -310,13 +296,8 @@ fn scale_exact(exact: &ExactExpression, factor: &BigRational) -> ExactExpression
     match exact {
         ExactExpression::Rational(value) => ExactExpression::Rational(value * factor),
         _ if (-factor).is_one() => ExactExpression::Negative(Box::new(exact.clone())),
-        _ if factor.is_negative() => {
-            ExactExpression::Negative(Box::new(scale_exact(exact, &-factor)))
-        }
-        _ => ExactExpression::Product(vec![
-            ExactExpression::Rational(factor.clone()),
-            exact.clone(),
-        ]),
+        _ if factor.is_negative() => ExactExpression::Negative(Box::new(scale_exact(exact, &-factor))),
+        _ => ExactExpression::Product(vec![ExactExpression::Rational(factor.clone()), exact.clone()]),
     }
 }
 

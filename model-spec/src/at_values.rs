@@ -8,9 +8,7 @@ use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 
 use crate::exact::{ConstantIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol};
-use crate::mechanism::{
-    EffectBodies, FrameStep, LumpedMass, Mechanism, ModelConstant, ModelPart, PartInertia,
-};
+use crate::mechanism::{EffectBodies, FrameStep, LumpedMass, Mechanism, ModelConstant, ModelPart, PartInertia};
 
 /// Number of significant digits of a decimal that are kept; digits behind them are rounding.
 const DIGITS: usize = 15;
@@ -29,11 +27,7 @@ impl Mechanism {
         let mut at = self.clone();
         let stands = ConstantSubstitutes::new(&self.constants);
         // Only angles that stay constants are kept, under new indices.
-        at.constants = stands
-            .kept
-            .iter()
-            .map(|i| self.constants[*i].clone())
-            .collect();
+        at.constants = stands.kept.iter().map(|i| self.constants[*i].clone()).collect();
         at.gravity = self.gravity.each_ref().map(|x| stands.exact(x));
         // Replace constants in every expression: frames, points, couplings, bodies and effects.
         for frame in &mut at.frames {
@@ -68,10 +62,7 @@ impl Mechanism {
             for (_, value) in &mut effect.constants {
                 *value = stands.exact(value);
             }
-            let EffectBodies {
-                parts,
-                lumped_masses,
-            } = &mut effect.bodies;
+            let EffectBodies { parts, lumped_masses } = &mut effect.bodies;
             stands.bodies(parts, lumped_masses);
         }
         at.is_at_values = true;
@@ -121,15 +112,11 @@ impl ConstantSubstitutes {
             let whole = twelfths.round();
             if (twelfths - whole).abs() <= ROUNDING_SHARE * 12.0 * whole.abs().max(1.0) {
                 let whole = BigInt::from(whole.to_i64().unwrap_or(0));
-                of.push(SubstituteValue::Turn(BigRational::new(
-                    whole,
-                    BigInt::from(12),
-                )));
+                of.push(SubstituteValue::Turn(BigRational::new(whole, BigInt::from(12))));
                 continue;
             }
             // Equal angles share one constant, so that their sines are recognised as equal.
-            let same =
-                |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
+            let same = |at: &usize| exact_decimal(constants[*at].value) == exact_decimal(constant.value);
             let at = kept.iter().position(same).unwrap_or(kept.len());
             if at == kept.len() {
                 kept.push(of.len());
@@ -148,18 +135,13 @@ impl ConstantSubstitutes {
             ExactExpression::Symbol(ModelSymbol::Constant(i)) => match &self.values[i.0] {
                 SubstituteValue::Number(value) => ExactExpression::Rational(value.clone()),
                 // A zero angle becomes the number zero, which later stages recognise.
-                SubstituteValue::Turn(value) if value.is_zero() => {
-                    ExactExpression::Rational(value.clone())
+                SubstituteValue::Turn(value) if value.is_zero() => ExactExpression::Rational(value.clone()),
+                SubstituteValue::Turn(value) => {
+                    ExactExpression::Product(vec![ExactExpression::Rational(value.clone()), ExactExpression::Pi])
                 }
-                SubstituteValue::Turn(value) => ExactExpression::Product(vec![
-                    ExactExpression::Rational(value.clone()),
-                    ExactExpression::Pi,
-                ]),
                 SubstituteValue::Constant(i) => ExactExpression::Symbol(ModelSymbol::Constant(*i)),
             },
-            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => {
-                exact.clone()
-            }
+            ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => exact.clone(),
             ExactExpression::Sum(operands) => ExactExpression::Sum(all(operands)),
             ExactExpression::Product(operands) => ExactExpression::Product(all(operands)),
             ExactExpression::Quotient(a, b) => ExactExpression::Quotient(inner(a), inner(b)),

@@ -97,20 +97,10 @@ fn units(quantity: ColumnQuantity) -> &'static [(&'static str, f64)] {
         ColumnQuantity::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("min", 60.0)],
         ColumnQuantity::Number => &[("1", 1.0)],
         ColumnQuantity::Angle(0) => &[("rad", 1.0), ("deg", DEGREE), ("mrad", 1e-3), ("rev", TURN)],
-        ColumnQuantity::Angle(1) => &[
-            ("rad/s", 1.0),
-            ("deg/s", DEGREE),
-            ("rpm", TURN / 60.0),
-            ("rev/s", TURN),
-        ],
+        ColumnQuantity::Angle(1) => &[("rad/s", 1.0), ("deg/s", DEGREE), ("rpm", TURN / 60.0), ("rev/s", TURN)],
         ColumnQuantity::Angle(_) => &[("rad/s^2", 1.0), ("deg/s^2", DEGREE), ("rev/s^2", TURN)],
         ColumnQuantity::Length(0) => &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6)],
-        ColumnQuantity::Length(1) => &[
-            ("m/s", 1.0),
-            ("mm/s", 1e-3),
-            ("cm/s", 1e-2),
-            ("mm/min", 1e-3 / 60.0),
-        ],
+        ColumnQuantity::Length(1) => &[("m/s", 1.0), ("mm/s", 1e-3), ("cm/s", 1e-2), ("mm/min", 1e-3 / 60.0)],
         ColumnQuantity::Length(_) => &[("m/s^2", 1.0), ("mm/s^2", 1e-3), ("cm/s^2", 1e-2)],
         ColumnQuantity::Force => &[("N", 1.0), ("kN", 1e3), ("mN", 1e-3)],
         ColumnQuantity::Torque => &[
@@ -143,9 +133,7 @@ impl Mechanism {
                     // Rates of the vector part are angular velocities; the scalar part has none.
                     CoordinateMotion::Quaternion if order > 0 => ColumnQuantity::Angle(order),
                     CoordinateMotion::QuaternionScalar if order > 0 => continue,
-                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => {
-                        ColumnQuantity::Number
-                    }
+                    CoordinateMotion::Quaternion | CoordinateMotion::QuaternionScalar => ColumnQuantity::Number,
                 };
                 columns.push((format!("{}{suffix}", coordinate.name), quantity));
             }
@@ -313,9 +301,7 @@ pub(crate) fn fault_without_recording(text: &str) -> Option<String> {
 
 /// Splits a unit in brackets off the end: the text before it, and the unit.
 fn split_unit(text: &str) -> (&str, Option<&str>) {
-    let split = text
-        .strip_suffix(']')
-        .and_then(|rest| rest.rsplit_once('['));
+    let split = text.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
     match split {
         Some((body, unit)) if !body.trim().is_empty() => (body.trim(), Some(unit.trim())),
         _ => (text, None),
@@ -326,18 +312,16 @@ fn split_unit(text: &str) -> (&str, Option<&str>) {
 fn factor_of(unit: &str, quantity: ColumnQuantity) -> Result<f64, ColumnFault> {
     let units = units(quantity);
     let found = units.iter().find(|(name, _)| *name == unit);
-    found
-        .map(|(_, factor)| *factor)
-        .ok_or_else(|| ColumnFault::Malformed {
-            says: format!(
-                "the unit `{unit}` does not fit this quantity; expected one of {}",
-                units
-                    .iter()
-                    .map(|(name, _)| format!("`{name}`"))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            ),
-        })
+    found.map(|(_, factor)| *factor).ok_or_else(|| ColumnFault::Malformed {
+        says: format!(
+            "the unit `{unit}` does not fit this quantity; expected one of {}",
+            units
+                .iter()
+                .map(|(name, _)| format!("`{name}`"))
+                .collect::<Vec<_>>()
+                .join(", ")
+        ),
+    })
 }
 
 /// An affine value during evaluation.
@@ -398,10 +382,7 @@ impl AffineValue {
 }
 
 /// Evaluates an expression; `look_up` gives the value of each name.
-fn affine_value(
-    ast: &FormulaAst,
-    look_up: &dyn Fn(&str) -> Option<AffineValue>,
-) -> Result<AffineValue, AffineFault> {
+fn affine_value(ast: &FormulaAst, look_up: &dyn Fn(&str) -> Option<AffineValue>) -> Result<AffineValue, AffineFault> {
     let of = |ast: &FormulaAst| affine_value(ast, look_up);
     // Divisors, bases of powers and operands of functions must be free of columns.
     let number = |ast: &FormulaAst, what: &str| {
@@ -416,9 +397,7 @@ fn affine_value(
     let value = match &ast.kind {
         FormulaAstKind::Rational(value) => AffineValue::number(value.to_f64().unwrap_or(f64::NAN)),
         FormulaAstKind::Pi => AffineValue::number(std::f64::consts::PI),
-        FormulaAstKind::Name(name) => {
-            look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?
-        }
+        FormulaAstKind::Name(name) => look_up(name).ok_or_else(|| AffineFault::Name(name.clone()))?,
         FormulaAstKind::Sum(terms) => {
             let mut sum = AffineValue::default();
             for term in terms {
@@ -449,9 +428,7 @@ fn affine_value(
             of(above)?.map(|value| value / below)
         }
         FormulaAstKind::Power(base, 1) => of(base)?,
-        FormulaAstKind::Power(base, exponent) => {
-            AffineValue::number(number(base, "in a power")?.powi(*exponent))
-        }
+        FormulaAstKind::Power(base, exponent) => AffineValue::number(number(base, "in a power")?.powi(*exponent)),
         FormulaAstKind::Apply(function, inner) => {
             AffineValue::number(apply_function(*function, number(inner, "in a function")?))
         }
@@ -524,10 +501,7 @@ mod tests {
     #[test]
     fn what_cannot_be_read_says_why() {
         let says = |text: &str| read(text).unwrap_err().to_string();
-        assert_eq!(
-            says("qm7/45"),
-            "the recording has no column `qm7`; did you mean `qm5`?"
-        );
+        assert_eq!(says("qm7/45"), "the recording has no column `qm7`; did you mean `qm5`?");
         assert_eq!(says("gear box"), "the recording has no column `gear box`");
         assert!(says("qm5*qm6").contains("multiplied with each other"));
         assert!(says("1/qm5").contains("below a fraction line"));
@@ -536,22 +510,13 @@ mod tests {
         assert!(says("qm5/0").contains("zero") || says("qm5/0").contains("finite"));
         assert!(says("qm5 - qm5 + 1").contains("no column"));
         assert!(says("qm5 +").contains("neither the name of a column nor an expression"));
-        assert!(
-            says("qm5 [mm]")
-                .contains("`mm` does not fit this quantity; expected one of `rad`, `deg`")
-        );
+        assert!(says("qm5 [mm]").contains("`mm` does not fit this quantity; expected one of `rad`, `deg`"));
     }
 
     #[test]
     fn columns_of_logs_stand_in_sums() {
-        let names = [
-            "joints.position.q",
-            "joints.position.q2",
-            "lab/split.effort.arm/wrist",
-        ]
-        .map(str::to_owned);
-        let read =
-            |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
+        let names = ["joints.position.q", "joints.position.q2", "lab/split.effort.arm/wrist"].map(str::to_owned);
+        let read = |text: &str| read_column(text, ColumnQuantity::Angle(0), &names, &|_| None).unwrap();
         let sum = read("-joints.position.q/2 + 3*joints.position.q2");
         assert_eq!(
             sum.terms,
@@ -563,12 +528,7 @@ mod tests {
         let sum = read("2*lab/split.effort.arm/wrist - 1");
         assert_eq!(sum.terms, [("lab/split.effort.arm/wrist".to_owned(), 2.0)]);
         assert!((sum.offset + 1.0).abs() < 1e-15);
-        let missing = read_column(
-            "-joints.position.q3",
-            ColumnQuantity::Angle(0),
-            &names,
-            &|_| None,
-        );
+        let missing = read_column("-joints.position.q3", ColumnQuantity::Angle(0), &names, &|_| None);
         assert!(missing.is_err());
     }
 }

@@ -89,11 +89,7 @@ impl Diagnostic {
 
     /// Points to where a variant removes what is missing; otherwise gives other advice.
     #[must_use]
-    pub(crate) fn with_removal_or(
-        self,
-        removal: Option<SourceSpan>,
-        advice: impl FnOnce() -> String,
-    ) -> Self {
+    pub(crate) fn with_removal_or(self, removal: Option<SourceSpan>, advice: impl FnOnce() -> String) -> Self {
         match removal {
             Some(span) => self
                 .related(span, "the variant removes it here")
@@ -243,12 +239,7 @@ pub(crate) fn render(
     color: bool,
     spelling: &dyn RemedySpelling,
 ) -> String {
-    let renderer = if color {
-        Renderer::styled()
-    } else {
-        Renderer::plain()
-    }
-    .decor_style(DecorStyle::Ascii);
+    let renderer = if color { Renderer::styled() } else { Renderer::plain() }.decor_style(DecorStyle::Ascii);
     let mut text = String::new();
     for diagnostic in diagnostics {
         text.push_str(&render_one(diagnostic, sources, &renderer, spelling));
@@ -279,11 +270,7 @@ fn render_one(
         // A second place in the same file goes into the same snippet, otherwise into a snippet of its own.
         match diagnostic.related.as_ref() {
             Some((other, text)) if other.file == span.file => {
-                group = annotate_lines(
-                    group,
-                    sources,
-                    &[(span, label, true), (*other, Some(text), false)],
-                );
+                group = annotate_lines(group, sources, &[(span, label, true), (*other, Some(text), false)]);
             }
             Some((other, text)) => {
                 group = annotate_lines(group, sources, &[(span, label, true)]);
@@ -313,10 +300,7 @@ fn annotate_lines<'a>(
     sources: &'a SourceFiles,
     marks: &[(SourceSpan, Option<&'a str>, bool)],
 ) -> Group<'a> {
-    let Some(file) = marks
-        .first()
-        .and_then(|mark| sources.files.get(mark.0.file))
-    else {
+    let Some(file) = marks.first().and_then(|mark| sources.files.get(mark.0.file)) else {
         return group;
     };
     // The window covers all complete lines from the first mark to the last.
@@ -327,9 +311,7 @@ fn annotate_lines<'a>(
     let start = line_start(text, first);
     let end = line_end(text, last);
     let window = &text[start..end];
-    if window.lines().any(|line| line.len() > LONGEST_PRINTED_LINE)
-        || window.len() > 200 * LONGEST_PRINTED_LINE
-    {
+    if window.lines().any(|line| line.len() > LONGEST_PRINTED_LINE) || window.len() > 200 * LONGEST_PRINTED_LINE {
         let (line, column) = sources.line_and_column(marks[0].0);
         let mut group = group.element(Origin::path(path).line(line).char_column(column));
         if let Some(label) = marks[0].1 {

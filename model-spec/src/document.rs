@@ -59,9 +59,7 @@ impl TomlNode {
     pub(crate) fn kind(&self) -> &'static str {
         match &self.value {
             TomlValue::Text { .. } => "a string",
-            TomlValue::Number {
-                is_integer: true, ..
-            } => "an integer",
+            TomlValue::Number { is_integer: true, .. } => "an integer",
             TomlValue::Number { .. } => "a number",
             TomlValue::Boolean(_) => "a boolean",
             TomlValue::Datetime => "a date",
@@ -118,11 +116,7 @@ pub(crate) fn parse_toml(text: &str, file: usize, log: &mut DiagnosticLog) -> To
 
 /// Parses a text without open brackets; checks its size and reports syntax errors, one per line.
 fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
-    let whole = SourceSpan {
-        file,
-        start: 0,
-        end: 0,
-    };
+    let whole = SourceSpan { file, start: 0, end: 0 };
     if text.len() > LARGEST_FILE {
         log.syntax_broken = true;
         log.push(
@@ -143,9 +137,7 @@ fn parse_closed(text: &str, file: usize, log: &mut DiagnosticLog) -> TomlTable {
         // A second error on the same line is usually a consequence of the first.
         let at = error.span().map_or(0, |range| range.start.min(text.len()));
         let before = last.replace(at);
-        if before
-            .is_some_and(|before| before <= at && !text.as_bytes()[before..at].contains(&b'\n'))
-        {
+        if before.is_some_and(|before| before <= at && !text.as_bytes()[before..at].contains(&b'\n')) {
             continue;
         }
         let span = error.span().map_or(whole, |range| SourceSpan {
@@ -196,10 +188,12 @@ fn syntax_error(span: SourceSpan, message: &str) -> Diagnostic {
         "see https://toml.io for the syntax of TOML"
     };
     Diagnostic::error(span, format!("this is not TOML: {}", quote(message)))
-        .label(message.split(", expected ").nth(1).map_or_else(
-            || "here".to_owned(),
-            |expected| format!("expected {}", quote(expected)),
-        ))
+        .label(
+            message
+                .split(", expected ")
+                .nth(1)
+                .map_or_else(|| "here".to_owned(), |expected| format!("expected {}", quote(expected))),
+        )
         .help(help)
 }
 
@@ -235,10 +229,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
             let inner = [1, 3, 4]
                 .into_iter()
                 .map(|skip| range.start + skip)
-                .find(|&at| {
-                    text.get(at..at + string.len())
-                        .is_some_and(|found| found == string)
-                });
+                .find(|&at| text.get(at..at + string.len()).is_some_and(|found| found == string));
             TomlValue::Text {
                 text: string.into_owned(),
                 inner,
@@ -253,10 +244,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
                 i128::from_str_radix(digits, integer.radix())
                     .map_or_else(|_| digits.to_owned(), |value| value.to_string())
             };
-            TomlValue::Number {
-                text,
-                is_integer: true,
-            }
+            TomlValue::Number { text, is_integer: true }
         }
         DeValue::Float(float) => TomlValue::Number {
             text: float.as_str().to_owned(),
@@ -264,12 +252,7 @@ fn node(value: toml::Spanned<DeValue<'_>>, text: &str, file: usize) -> TomlNode 
         },
         DeValue::Boolean(value) => TomlValue::Boolean(value),
         DeValue::Datetime(_) => TomlValue::Datetime,
-        DeValue::Array(array) => TomlValue::Array(
-            array
-                .into_iter()
-                .map(|entry| node(entry, text, file))
-                .collect(),
-        ),
+        DeValue::Array(array) => TomlValue::Array(array.into_iter().map(|entry| node(entry, text, file)).collect()),
         DeValue::Table(inner) => TomlValue::Table(table(inner, text, file)),
     };
     TomlNode { span, value }

@@ -110,19 +110,10 @@ const NEW_EFFECT: &str = "the effect to be added";
 
 /// Moves the places of a failure from the edited text to texts that the user knows: the file as it is, and the effect
 /// as a text of its own.
-fn relocate_failure(
-    mut failure: LoadFailure,
-    old: &str,
-    new: &str,
-    effect: &NewEffect,
-) -> LoadFailure {
+fn relocate_failure(mut failure: LoadFailure, old: &str, new: &str, effect: &NewEffect) -> LoadFailure {
     let line_end = if old.contains("\r\n") { "\r\n" } else { "\n" };
     // Length of the common beginning of both texts; the edit lies behind it.
-    let same = old
-        .bytes()
-        .zip(new.bytes())
-        .take_while(|(a, b)| a == b)
-        .count();
+    let same = old.bytes().zip(new.bytes()).take_while(|(a, b)| a == b).count();
     // The same text before the place of the edit belongs to another effect.
     let found = [effect_table(effect, line_end), inline_effect(effect)]
         .into_iter()
@@ -203,9 +194,7 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
     if let Some((key, _)) = find_key(&table, "identified") {
         let start = text[..key.span.start].rfind('\n').map_or(0, |end| end + 1);
         if text[start..].lines().next().map(str::trim) != Some("[identified]") {
-            return Err(
-                "write `[identified]` as a table of its own, on a line of its own".to_owned(),
-            );
+            return Err("write `[identified]` as a table of its own, on a line of its own".to_owned());
         }
         let mut end = text.len();
         let mut at = start;
@@ -218,13 +207,8 @@ pub fn write_identified(text: &str, values: &AdoptedValues) -> Result<String, St
         }
         // Comments and blank lines above the next table belong to that table.
         let own = &text[start..end];
-        let last = own
-            .trim_end()
-            .rfind(['\n', ']', '}'])
-            .unwrap_or(own.len() - 1);
-        let own_end = own[last..]
-            .find('\n')
-            .map_or(own.len(), |line| last + line + 1);
+        let last = own.trim_end().rfind(['\n', ']', '}']).unwrap_or(own.len() - 1);
+        let own_end = own[last..].find('\n').map_or(own.len(), |line| last + line + 1);
         kept = format!("{}{}", text[..start].trim_end(), line_end);
         let rest = &text[start + own_end..];
         // The new table takes the place of the old one if other tables follow.
@@ -254,18 +238,14 @@ fn identified_table(values: &AdoptedValues, line_end: &str) -> String {
     lines.extend(comment.map(|line| format!("# {}", line.replace(char::is_control, " "))));
     if !values.parameters.is_empty() {
         let pairs = values.parameters.iter();
-        let pairs: Vec<String> = pairs
-            .map(|(name, value)| format!("{name} = {value:?}"))
-            .collect();
+        let pairs: Vec<String> = pairs.map(|(name, value)| format!("{name} = {value:?}")).collect();
         lines.push(format!("parameters = {{ {} }}", pairs.join(", ")));
     }
     if !values.base.is_empty() {
         lines.push("base = [".to_owned());
         for (expression, value) in &values.base {
             let expression = expression.replace('\\', "\\\\").replace('"', "\\\"");
-            lines.push(format!(
-                "  {{ expression = \"{expression}\", value = {value:?} }},"
-            ));
+            lines.push(format!("  {{ expression = \"{expression}\", value = {value:?} }},"));
         }
         lines.push("]".to_owned());
     }
@@ -306,8 +286,7 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
         Some((key, node)) => {
             let TomlValue::Array(entries) = &node.value else {
                 return Err(EditFailure::Effect(
-                    "`effect` of this file is not a list of tables; write effects as `[[effect]]`"
-                        .to_owned(),
+                    "`effect` of this file is not a list of tables; write effects as `[[effect]]`".to_owned(),
                 ));
             };
             // The key of an inline list is followed by `=`, that of a header by `]]`.
@@ -325,10 +304,7 @@ pub fn add_effect(text: &str, effect: &NewEffect) -> Result<String, EditFailure>
 fn end_of(node: &TomlNode) -> usize {
     let inner = match &node.value {
         TomlValue::Array(entries) => entries.iter().map(end_of).max(),
-        TomlValue::Table(table) => table
-            .iter()
-            .map(|(key, node)| key.span.end.max(end_of(node)))
-            .max(),
+        TomlValue::Table(table) => table.iter().map(|(key, node)| key.span.end.max(end_of(node))).max(),
         _ => None,
     };
     inner.unwrap_or(0).max(node.span.end)
@@ -360,13 +336,7 @@ fn append(text: &str, effect: &NewEffect, line_end: &str) -> String {
 }
 
 /// Inserts an entry behind the last one of an inline list.
-fn extend_inline(
-    text: &str,
-    list: &TomlNode,
-    entries: &[TomlNode],
-    effect: &NewEffect,
-    line_end: &str,
-) -> String {
+fn extend_inline(text: &str, list: &TomlNode, entries: &[TomlNode], effect: &NewEffect, line_end: &str) -> String {
     let entry = inline_effect(effect);
     let Some(last) = entries.last() else {
         let at = list.span.start + 1; // Position behind the bracket.
@@ -387,10 +357,7 @@ fn extend_inline(
         None => (Some(end), end),
     };
     // A comment on the same line belongs to the last entry, so the new one goes to the next line.
-    let rest_of_line = text[behind..]
-        .split_inclusive('\n')
-        .next()
-        .unwrap_or_default();
+    let rest_of_line = text[behind..].split_inclusive('\n').next().unwrap_or_default();
     let remark = rest_of_line.trim_start().starts_with('#');
     let (at, lead) = if remark {
         let length = rest_of_line.trim_end_matches(['\r', '\n']).len();
@@ -450,12 +417,7 @@ fn inline_effect(effect: &NewEffect) -> String {
 /// The lines of the remark without control characters.
 fn remarks(effect: &NewEffect) -> impl Iterator<Item = String> {
     let lines = effect.comment.iter().flat_map(|comment| comment.lines());
-    lines.map(|line| {
-        line.trim()
-            .chars()
-            .filter(|char| !char.is_control())
-            .collect()
-    })
+    lines.map(|line| line.trim().chars().filter(|char| !char.is_control()).collect())
 }
 
 /// The fields of the effect as `key = value`; parameters and constants only if there are any.
@@ -508,12 +470,7 @@ fn check_writable(effect: &NewEffect) -> Result<(), EditFailure> {
     }
     let values = parameters
         .filter_map(|one| Some((&one.symbol, one.nominal?)))
-        .chain(
-            effect
-                .constants
-                .iter()
-                .map(|(symbol, value)| (symbol, *value)),
-        );
+        .chain(effect.constants.iter().map(|(symbol, value)| (symbol, *value)));
     for (symbol, value) in values {
         if !value.is_finite() {
             return Err(EditFailure::Effect(format!(
@@ -535,17 +492,13 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
         return Err(unknown("kind", &effect.kind, known, ""));
     };
     let of = format!(" of `{}`", kind.name);
-    let symbols: Vec<&str> = (kind.parameters.iter())
-        .map(|one| one.symbol.as_str())
-        .collect();
+    let symbols: Vec<&str> = (kind.parameters.iter()).map(|one| one.symbol.as_str()).collect();
     for one in &effect.parameters {
         if !symbols.contains(&one.symbol.as_str()) {
             return Err(unknown("parameter", &one.symbol, symbols, &of));
         }
     }
-    let symbols: Vec<&str> = (kind.constants.iter())
-        .map(|one| one.symbol.as_str())
-        .collect();
+    let symbols: Vec<&str> = (kind.constants.iter()).map(|one| one.symbol.as_str()).collect();
     for (symbol, _) in &effect.constants {
         if !symbols.contains(&symbol.as_str()) {
             return Err(unknown("constant", symbol, symbols, &of));
@@ -555,11 +508,7 @@ fn kind_of<'a>(effect: &NewEffect, kinds: &'a [EffectKind]) -> Result<&'a Effect
 }
 
 /// Refuses an effect that already acts at one of its places with the same constants.
-fn refuse_twin(
-    effect: &NewEffect,
-    kind: &EffectKind,
-    mechanism: &Mechanism,
-) -> Result<(), EditFailure> {
+fn refuse_twin(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism) -> Result<(), EditFailure> {
     // The value of the new effect, else the default of the kind.
     let wanted = |symbol: &str| {
         let given = effect.constants.iter().find(|(name, _)| name == symbol);
@@ -581,9 +530,7 @@ fn refuse_twin(
         }
         // Tilt and delay are properties of the complete mechanism, whatever their constants are.
         let whole = matches!(known.places[..], [EffectPlace::Base | EffectPlace::Force]);
-        let place = names
-            .into_iter()
-            .find(|name| effect.at.iter().any(|at| at == name));
+        let place = names.into_iter().find(|name| effect.at.iter().any(|at| at == name));
         if let Some(place) = place.filter(|_| alike || whole) {
             return Err(EditFailure::Effect(format!(
                 "`{}` acts at `{place}` already; change that effect in the model file instead, or remove it there",
@@ -603,13 +550,8 @@ fn with_free_names(effect: &NewEffect, kind: &EffectKind, mechanism: &Mechanism)
     let mut named = effect.clone();
     for symbol in kind.parameters.iter().map(|one| &one.symbol) {
         let usual = format!("{symbol}_{}", effect.at.join("_"));
-        let said = named
-            .parameters
-            .iter()
-            .position(|one| one.symbol == *symbol);
-        if !taken.contains(usual.as_str())
-            || said.is_some_and(|i| named.parameters[i].name.is_some())
-        {
+        let said = named.parameters.iter().position(|one| one.symbol == *symbol);
+        if !taken.contains(usual.as_str()) || said.is_some_and(|i| named.parameters[i].name.is_some()) {
             continue;
         }
         // One of these numbers is free, because there are more of them than names.
@@ -647,8 +589,7 @@ impl ModelEffect {
     /// omitted.
     pub fn constant(&self, symbol: &str, mechanism: &Mechanism) -> Option<f64> {
         let found = self.constants.iter().find(|(name, _)| name == symbol);
-        let value =
-            |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         found.map(|(_, exact)| value(exact))
     }
 }

@@ -50,9 +50,7 @@ fn optional_schema(schema: &Value) -> Value {
                 // A property may be called `required`; only a list of names is the keyword.
                 .filter(|(key, value)| !(*key == "required" && value.is_array()))
                 .map(|(key, value)| match value.as_str() {
-                    Some(target) if key == "$ref" => {
-                        (key.clone(), Value::String(format!("{target}{PARTIAL}")))
-                    }
+                    Some(target) if key == "$ref" => (key.clone(), Value::String(format!("{target}{PARTIAL}"))),
                     _ => (key.clone(), optional_schema(value)),
                 })
                 .collect(),
@@ -86,11 +84,7 @@ fn prune(schema: &mut Value, known: &[String]) {
             if let Some(definitions) = schema["$defs"].as_object_mut() {
                 definitions.remove(&copy);
             }
-            redirect(
-                schema,
-                &format!("#/$defs/{copy}"),
-                &format!("#/$defs/{name}"),
-            );
+            redirect(schema, &format!("#/$defs/{copy}"), &format!("#/$defs/{name}"));
         }
     }
 }

@@ -60,10 +60,7 @@ impl PlaceQuantity {
 
     /// Whether it belongs to the other one of two places.
     pub fn is_other(self) -> bool {
-        matches!(
-            self,
-            Self::OtherCoordinate | Self::OtherRate | Self::OtherAcceleration
-        )
+        matches!(self, Self::OtherCoordinate | Self::OtherRate | Self::OtherAcceleration)
     }
 }
 

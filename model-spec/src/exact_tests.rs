@@ -88,8 +88,7 @@ fn any_exact() -> impl Strategy<Value = ExactExpression> {
             ExactExpression::Rational(rational(if minus { -above } else { above }, below))
         }),
         Just(ExactExpression::Pi),
-        (0_usize..NAMES.len())
-            .prop_map(|i| ExactExpression::Symbol(ModelSymbol::Constant(ConstantIdx(i)))),
+        (0_usize..NAMES.len()).prop_map(|i| ExactExpression::Symbol(ModelSymbol::Constant(ConstantIdx(i)))),
     ];
     leaf.prop_recursive(4, 24, 3, |inner| {
         let functions = prop_oneof![
@@ -102,17 +101,11 @@ fn any_exact() -> impl Strategy<Value = ExactExpression> {
         prop_oneof![
             prop::collection::vec(inner.clone(), 2..4).prop_map(ExactExpression::Sum),
             prop::collection::vec(inner.clone(), 2..4).prop_map(ExactExpression::Product),
-            (inner.clone(), inner.clone()).prop_map(|(above, below)| ExactExpression::Quotient(
-                Box::new(above),
-                Box::new(below)
-            )),
-            inner
-                .clone()
-                .prop_map(|one| ExactExpression::Negative(Box::new(one))),
-            (inner.clone(), -2_i32..=2)
-                .prop_map(|(base, power)| ExactExpression::Power(Box::new(base), power)),
-            (functions, inner)
-                .prop_map(|(function, one)| ExactExpression::Apply(function, Box::new(one))),
+            (inner.clone(), inner.clone())
+                .prop_map(|(above, below)| ExactExpression::Quotient(Box::new(above), Box::new(below))),
+            inner.clone().prop_map(|one| ExactExpression::Negative(Box::new(one))),
+            (inner.clone(), -2_i32..=2).prop_map(|(base, power)| ExactExpression::Power(Box::new(base), power)),
+            (functions, inner).prop_map(|(function, one)| ExactExpression::Apply(function, Box::new(one))),
         ]
     })
 }
@@ -152,18 +145,9 @@ proptest! {
 
 #[test]
 fn decimals_are_exact() {
-    assert_eq!(
-        read("0.316"),
-        Some(ExactExpression::Rational(rational(79, 250)))
-    );
-    assert_eq!(
-        read("2.5e-3"),
-        Some(ExactExpression::Rational(rational(1, 400)))
-    );
-    assert_eq!(
-        read("-1/3"),
-        Some(ExactExpression::Rational(rational(-1, 3)))
-    );
+    assert_eq!(read("0.316"), Some(ExactExpression::Rational(rational(79, 250))));
+    assert_eq!(read("2.5e-3"), Some(ExactExpression::Rational(rational(1, 400))));
+    assert_eq!(read("-1/3"), Some(ExactExpression::Rational(rational(-1, 3))));
 }
 
 #[test]
@@ -197,23 +181,13 @@ fn angles_are_exact() {
         ("q - 2*(q - alpha)", (0, 1), 2),
         ("q - q", (0, 1), 0),
     ] {
-        let found = angle(
-            &formula(text).unwrap(),
-            &scope(),
-            &mut DiagnosticLog::default(),
-        )
-        .unwrap();
+        let found = angle(&formula(text).unwrap(), &scope(), &mut DiagnosticLog::default()).unwrap();
         assert_eq!(found.pi, rational(pi.0, pi.1), "{text}");
         assert_eq!(found.terms.len(), terms, "{text}");
     }
     for text in ["pi/5", "1.57", "q/2", "q*alpha", "sin(q)", "17*q", "s"] {
         assert!(
-            angle(
-                &formula(text).unwrap(),
-                &scope(),
-                &mut DiagnosticLog::default()
-            )
-            .is_none(),
+            angle(&formula(text).unwrap(), &scope(), &mut DiagnosticLog::default()).is_none(),
             "{text}"
         );
     }
@@ -232,13 +206,7 @@ fn lengths_are_linear_in_coordinates() {
     assert_eq!(found.offset, ExactExpression::Rational(rational(-3, 20)));
     for text in ["s^2", "s*s", "1/s", "a*s", "q"] {
         assert!(
-            length(
-                &formula(text).unwrap(),
-                &scope(),
-                "it",
-                &mut DiagnosticLog::default()
-            )
-            .is_none(),
+            length(&formula(text).unwrap(), &scope(), "it", &mut DiagnosticLog::default()).is_none(),
             "{text}"
         );
     }
@@ -249,19 +217,12 @@ fn dimensions_follow_the_formula() {
     let dimension = |text: &str| {
         let formula = formula(text).unwrap();
         scope()
-            .resolve_ast(
-                &formula.ast,
-                &[SymbolSort::Coordinate],
-                &mut DiagnosticLog::default(),
-            )
+            .resolve_ast(&formula.ast, &[SymbolSort::Coordinate], &mut DiagnosticLog::default())
             .map(|(_, dimension)| dimension)
     };
     assert_eq!(dimension("2*s"), Some(Some(UnitDimension::LENGTH)));
     assert_eq!(dimension("s*s/s"), Some(Some(UnitDimension::LENGTH)));
-    assert_eq!(
-        dimension("sqrt(s^2) + 0.1"),
-        Some(Some(UnitDimension::LENGTH))
-    );
+    assert_eq!(dimension("sqrt(s^2) + 0.1"), Some(Some(UnitDimension::LENGTH)));
     assert_eq!(dimension("s + q"), None);
     assert_eq!(dimension("cos(s)"), None);
     assert_eq!(dimension("3"), Some(None));

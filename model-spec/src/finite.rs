@@ -129,18 +129,12 @@ impl ValueFault<'_> {
             ),
         };
         let label = match self.cause {
-            ValueFaultCause::TooLarge => {
-                "it is too large with the constants of this file".to_owned()
-            }
+            ValueFaultCause::TooLarge => "it is too large with the constants of this file".to_owned(),
             _ => format!("this is {} with the constants of this file", self.value),
         };
-        let found = Diagnostic::error(self.piece.span, message)
-            .label(label)
-            .help(help);
+        let found = Diagnostic::error(self.piece.span, message).label(label).help(help);
         match (declared, &self.piece.kind) {
-            (Some(declared), FormulaAstKind::Name(_)) => {
-                found.related(declared, "its value stands here")
-            }
+            (Some(declared), FormulaAstKind::Name(_)) => found.related(declared, "its value stands here"),
             _ => found,
         }
     }
@@ -151,12 +145,10 @@ pub(crate) fn mentions(ast: &FormulaAst, name: &str) -> bool {
     match &ast.kind {
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => false,
         FormulaAstKind::Name(found) => found == name,
-        FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
-            inner.iter().any(|one| mentions(one, name))
-        }
+        FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => inner.iter().any(|one| mentions(one, name)),
         FormulaAstKind::Quotient(above, below) => mentions(above, name) || mentions(below, name),
-        FormulaAstKind::Negative(inner)
-        | FormulaAstKind::Power(inner, _)
-        | FormulaAstKind::Apply(_, inner) => mentions(inner, name),
+        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
+            mentions(inner, name)
+        }
     }
 }

@@ -9,10 +9,7 @@ use crate::values::UnitByPlace;
 
 /// Checks what a kind adds: an expression at places that allow one, or mechanics with their own symbols and places.
 /// False if it has mechanics or is faulty, so that there is no expression to check.
-pub(crate) fn check_expression_or_mechanics(
-    entry: &EffectKindEntry,
-    log: &mut DiagnosticLog,
-) -> bool {
+pub(crate) fn check_expression_or_mechanics(entry: &EffectKindEntry, log: &mut DiagnosticLog) -> bool {
     // Messages point to the name of the kind, or to its table if it has none.
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     let mut places = entry.on.iter().flat_map(|on| &on.entries);
@@ -33,10 +30,7 @@ pub(crate) fn check_expression_or_mechanics(
         if let (Some(found), Some(on)) = (elsewhere, &entry.on) {
             log.push(
                 Diagnostic::error(on.span, "an expression cannot act here")
-                    .label(format!(
-                        "on {} there is nothing to add to",
-                        found.description()
-                    ))
+                    .label(format!("on {} there is nothing to add to", found.description()))
                     .help("expressions act on a drive, a coordinate or a point"),
             );
             return false;
@@ -97,12 +91,13 @@ fn check_symbols(
     for (key, units) in &found {
         let Some((_, dimension)) = expected.iter().find(|(name, _)| *name == key.name) else {
             log.push(
-                Diagnostic::error(key.span, format!("these mechanics have no `{}`", key.name))
-                    .label(if names.is_empty() {
+                Diagnostic::error(key.span, format!("these mechanics have no `{}`", key.name)).label(
+                    if names.is_empty() {
                         format!("they have no {what}")
                     } else {
                         format!("expected {}", names.join(", "))
-                    }),
+                    },
+                ),
             );
             continue;
         };

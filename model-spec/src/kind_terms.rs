@@ -29,10 +29,7 @@ pub(crate) fn symbols_without_unit(entry: &EffectKindEntry, carries: PlaceLoad) 
     parameters
         .chain(constants)
         // A missing unit was reported by the reader, so it does not count here.
-        .filter(|(_, unit)| {
-            unit.as_ref()
-                .is_some_and(|unit| carries.unit(unit).is_none())
-        })
+        .filter(|(_, unit)| unit.as_ref().is_some_and(|unit| carries.unit(unit).is_none()))
         .map(|(key, _)| key.name.as_str())
         .collect()
 }
@@ -69,11 +66,7 @@ pub(crate) fn factors(
     let exact = scope.resolve(
         expression,
         FormulaRequirement {
-            sorts: &[
-                SymbolSort::Parameter,
-                SymbolSort::Constant,
-                SymbolSort::Place,
-            ],
+            sorts: &[SymbolSort::Parameter, SymbolSort::Constant, SymbolSort::Place],
             dimension: carries.dimension(),
             what: &what,
         },
@@ -81,17 +74,11 @@ pub(crate) fn factors(
     )?;
     // Resolving marked the names that the expression uses.
     for (key, _) in parameters {
-        if scope
-            .get(&key.name)
-            .is_some_and(|meaning| !meaning.used.get())
-        {
+        if scope.get(&key.name).is_some_and(|meaning| !meaning.used.get()) {
             log.push(
-                Diagnostic::error(
-                    key.span,
-                    format!("the expression does not use `{}`", key.name),
-                )
-                .label("a parameter without effect")
-                .help("use it in `expression`, or delete it"),
+                Diagnostic::error(key.span, format!("the expression does not use `{}`", key.name))
+                    .label("a parameter without effect")
+                    .help("use it in `expression`, or delete it"),
             );
         }
     }
@@ -135,10 +122,7 @@ fn scope(
     log: &mut DiagnosticLog,
 ) -> FormulaScope {
     let mut scope = FormulaScope::default();
-    let parameters = entry
-        .parameters
-        .iter()
-        .flat_map(|parameters| &parameters.entries);
+    let parameters = entry.parameters.iter().flat_map(|parameters| &parameters.entries);
     // Parameters by their index in the kind, which the split uses.
     for (i, (key, parameter)) in parameters.enumerate() {
         let unit = unit_at(parameter.unit.as_ref(), carries);
@@ -151,11 +135,7 @@ fn scope(
         );
     }
     // Constants with the expressions of the effect.
-    for (key, constant) in entry
-        .constants
-        .iter()
-        .flat_map(|constants| &constants.entries)
-    {
+    for (key, constant) in entry.constants.iter().flat_map(|constants| &constants.entries) {
         let unit = unit_at(constant.unit.as_ref(), carries);
         let exact = constants
             .iter()
@@ -231,36 +211,25 @@ fn is_parameter(symbol: ModelSymbol) -> bool {
 /// Splits `factor * exact` into terms per parameter; false if `exact` is not linear and homogeneous in them.
 ///
 /// The factor of each occurrence is appended to the list of its parameter.
-fn split_into_factors(
-    exact: &ExactExpression,
-    factor: &ExactExpression,
-    factors: &mut [Vec<ExactExpression>],
-) -> bool {
+fn split_into_factors(exact: &ExactExpression, factor: &ExactExpression, factors: &mut [Vec<ExactExpression>]) -> bool {
     match exact {
         // A parameter by itself: the accumulated factor belongs to it.
-        ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => {
-            match factors.get_mut(*i) {
-                Some(terms) => {
-                    terms.push(factor.clone());
-                    true
-                }
-                None => false,
+        ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(i))) => match factors.get_mut(*i) {
+            Some(terms) => {
+                terms.push(factor.clone());
+                true
             }
-        }
+            None => false,
+        },
         // Sums and signs are passed on to their operands.
-        ExactExpression::Sum(terms) => terms
-            .iter()
-            .all(|term| split_into_factors(term, factor, factors)),
-        ExactExpression::Negative(inner) => split_into_factors(
-            inner,
-            &ExactExpression::Negative(Box::new(factor.clone())),
-            factors,
-        ),
+        ExactExpression::Sum(terms) => terms.iter().all(|term| split_into_factors(term, factor, factors)),
+        ExactExpression::Negative(inner) => {
+            split_into_factors(inner, &ExactExpression::Negative(Box::new(factor.clone())), factors)
+        }
         ExactExpression::Product(members) => {
             // Exactly one member may contain parameters; all others join the factor.
-            let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) = members
-                .iter()
-                .partition(|member| member.mentions(&is_parameter));
+            let (with, without): (Vec<&ExactExpression>, Vec<&ExactExpression>) =
+                members.iter().partition(|member| member.mentions(&is_parameter));
             let [linear] = with.as_slice() else {
                 return false;
             };

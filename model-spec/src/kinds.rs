@@ -230,10 +230,7 @@ pub struct KindConstant {
 
 /// The kinds of the library that comes with the program.
 pub fn library() -> Vec<EffectKind> {
-    library_entries()
-        .iter()
-        .map(|entry| describe(entry, false))
-        .collect()
+    library_entries().iter().map(|entry| describe(entry, false)).collect()
 }
 
 /// The entries of the program's library, parsed once.
@@ -263,17 +260,9 @@ pub(crate) fn library_entries() -> &'static [EffectKindEntry] {
 }
 
 /// The kinds of a library file of the user; `file` is its index among the sources.
-pub(crate) fn own_library(
-    text: &str,
-    file: usize,
-    log: &mut DiagnosticLog,
-) -> Vec<EffectKindEntry> {
+pub(crate) fn own_library(text: &str, file: usize, log: &mut DiagnosticLog) -> Vec<EffectKindEntry> {
     let table = document::parse_toml(text, file, log);
-    let span = crate::SourceSpan {
-        file,
-        start: 0,
-        end: 0,
-    };
+    let span = crate::SourceSpan { file, start: 0, end: 0 };
     LibraryEntry::from_table(&table, span, log)
         .effect_kind
         .map_or_else(Vec::new, |list| list.entries)
@@ -292,22 +281,13 @@ pub(crate) fn describe(entry: &EffectKindEntry, is_own: bool) -> EffectKind {
             })
             .collect()
     };
-    let words =
-        |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
+    let words = |text: &Option<SpannedText>| text.as_ref().map_or_else(String::new, |t| t.text.clone());
     let parameters = entry.parameters.iter().flat_map(|table| &table.entries);
     let constants = entry.constants.iter().flat_map(|table| &table.entries);
     EffectKind {
-        name: entry
-            .name
-            .as_ref()
-            .map_or_else(String::new, |name| name.text.clone()),
+        name: entry.name.as_ref().map_or_else(String::new, |name| name.text.clone()),
         says: words(&entry.says),
-        on: entry
-            .on
-            .iter()
-            .flat_map(|on| &on.entries)
-            .copied()
-            .collect(),
+        on: entry.on.iter().flat_map(|on| &on.entries).copied().collect(),
         expression: entry
             .expression
             .as_ref()
@@ -449,11 +429,7 @@ pub(crate) fn check_kind(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
 
 /// Checks the default values of constants, which must be numbers.
 fn check_constant_values(entry: &EffectKindEntry, log: &mut DiagnosticLog) {
-    for (_, constant) in entry
-        .constants
-        .iter()
-        .flat_map(|constants| &constants.entries)
-    {
+    for (_, constant) in entry.constants.iter().flat_map(|constants| &constants.entries) {
         if let Some(value) = &constant.value {
             // Names have values only inside of a model, so an empty scope is used.
             FormulaScope::default().resolve_ast(&value.ast, &[], log);

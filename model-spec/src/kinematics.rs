@@ -39,10 +39,7 @@ pub(crate) fn frame_poses(mechanism: &Mechanism) -> Vec<FramePose> {
     // Each frame starts at its parent's pose, because parents come first.
     for (i, frame) in mechanism.frames.iter().enumerate() {
         let (mut rotation, mut origin) = if i == 0 {
-            (
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-                [0.0; 3],
-            )
+            ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3])
         } else {
             let parent = &poses[frame.parent.0];
             (parent.rotation, parent.origin)
@@ -154,20 +151,13 @@ pub(crate) fn position(mechanism: &Mechanism, poses: &[FramePose], point: PointI
     let point = &mechanism.points[point.0];
     let pose = &poses[point.frame.0];
     let local = [0, 1, 2].map(|k| point.at[k].evaluate(&value));
-    std::array::from_fn(|k| {
-        pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * local[j]).sum::<f64>()
-    })
+    std::array::from_fn(|k| pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * local[j]).sum::<f64>())
 }
 
 /// Derivative of a point's position by each coordinate: three rows with one column per coordinate.
 ///
 /// `at` is the position at which the point is taken, in the base frame, m.
-pub(crate) fn jacobian(
-    mechanism: &Mechanism,
-    poses: &[FramePose],
-    point: PointIdx,
-    at: Vec3,
-) -> [Vec<f64>; 3] {
+pub(crate) fn jacobian(mechanism: &Mechanism, poses: &[FramePose], point: PointIdx, at: Vec3) -> [Vec<f64>; 3] {
     let mut rows = [0, 1, 2].map(|_| vec![0.0; mechanism.coordinates.len()]);
     // Only the motions on the chain from the point's frame to the base move it.
     let mut frame = mechanism.points[point.0].frame.0;

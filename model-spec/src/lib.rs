@@ -55,8 +55,8 @@ pub use document::LARGEST_FILE;
 pub use exact::*;
 pub use joint_motion::CoordinateMotion;
 pub use kinds::{
-    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion,
-    PlaceLoad, Scale, Sign, library,
+    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, LIBRARY, OtherMotion, PlaceLoad, Scale, Sign,
+    library,
 };
 pub use load::{LoadFailure, LoadedModel, kinds_with, load, load_file, load_file_with, load_with};
 pub use mechanics::Mechanics;

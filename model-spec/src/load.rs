@@ -98,11 +98,7 @@ pub fn load_file(path: &Path) -> Result<LoadedModel, LoadFailure> {
 }
 
 /// Reads a model file as [`load_file`] does, with further libraries of kinds of effects, and all files from `files`.
-pub fn load_file_with(
-    path: &Path,
-    libraries: &[PathBuf],
-    files: &dyn FileSource,
-) -> Result<LoadedModel, LoadFailure> {
+pub fn load_file_with(path: &Path, libraries: &[PathBuf], files: &dyn FileSource) -> Result<LoadedModel, LoadFailure> {
     let advice = "give the path of a model file, such as `model-spec/models/two_link.toml`";
     let text = read_text(files, path, advice)?;
     load_with(&path.to_string_lossy(), &text, libraries, files)
@@ -131,11 +127,7 @@ pub fn load_file_with(
 /// let failure = modelmill_spec::load("p.toml", &text.replace("\"angle\" }", "\"angel\" }"), &files);
 /// assert!(failure.unwrap_err().render(false).contains("did you mean `angle`?"));
 /// ```
-pub fn load(
-    path_name: &str,
-    text: &str,
-    files: &dyn FileSource,
-) -> Result<LoadedModel, LoadFailure> {
+pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<LoadedModel, LoadFailure> {
     load_with(path_name, text, &[], files)
 }
 
@@ -170,10 +162,7 @@ pub fn load_with(
     let mut diagnostics = log.finish();
     let Some(mechanism) = mechanism else {
         diagnostics.sort_by_key(|found| found.severity);
-        return Err(LoadFailure {
-            diagnostics,
-            sources,
-        });
+        return Err(LoadFailure { diagnostics, sources });
     };
     Ok(LoadedModel {
         mechanism,
@@ -193,10 +182,7 @@ pub fn load_with(
 /// The kinds of effects of the program's library, followed by those of further libraries.
 ///
 /// Fails with every finding about the further libraries, each with its place.
-pub fn kinds_with(
-    libraries: &[PathBuf],
-    files: &dyn FileSource,
-) -> Result<Vec<EffectKind>, LoadFailure> {
+pub fn kinds_with(libraries: &[PathBuf], files: &dyn FileSource) -> Result<Vec<EffectKind>, LoadFailure> {
     let mut log = DiagnosticLog::default();
     let mut sources = SourceFiles::default();
     let named: Vec<NamedPath> = libraries.iter().map(|path| (path.clone(), None)).collect();
@@ -340,29 +326,18 @@ fn extended_file(
     let TomlValue::Text { text: target, .. } = &node.value else {
         // The merge drops a base's own `extends`, so its type must be checked here.
         if !sources.files.is_empty() && sources.files.len() > 1 {
-            log.push(
-                Diagnostic::error(node.span, "`extends` is not a path")
-                    .label("expected a path in quotes"),
-            );
+            log.push(Diagnostic::error(node.span, "`extends` is not a path").label("expected a path in quotes"));
         }
         return None;
     };
     let next = normalise_path(&path.parent().unwrap_or(Path::new("")).join(target));
     let mut refuse = |message: String, label: &str, help: &str| {
-        log.push(
-            Diagnostic::error(node.span, message)
-                .label(label)
-                .help(help),
-        );
+        log.push(Diagnostic::error(node.span, message).label(label).help(help));
         // Names that the missing file would define are not reported as unknown.
         log.syntax_broken = true;
     };
     // A file that is already in the chain would be read without end.
-    if sources
-        .files
-        .iter()
-        .any(|file| normalise_path(&file.path) == next)
-    {
+    if sources.files.iter().any(|file| normalise_path(&file.path) == next) {
         refuse(
             "these files extend one another in a circle".to_owned(),
             "this file is being read already",
@@ -381,9 +356,7 @@ fn extended_file(
     match read_referenced(files, &next, &["schema"]) {
         Ok(text) => Some((next, text)),
         // `.` next to a file without a folder in its path gives an empty path.
-        Err(FileError { fault, .. })
-            if fault == FileFault::Folder || next.as_os_str().is_empty() =>
-        {
+        Err(FileError { fault, .. }) if fault == FileFault::Folder || next.as_os_str().is_empty() => {
             refuse(
                 format!("`{}` is a folder", quote(target)),
                 "expected the path of a model file, relative to this one",

@@ -5,9 +5,7 @@
 
 use num_rational::BigRational;
 
-use crate::exact::{
-    CoordinateIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol, ParameterIdx,
-};
+use crate::exact::{CoordinateIdx, ExactAngle, ExactExpression, ExactLength, ModelSymbol, ParameterIdx};
 use crate::joint_motion::CoordinateMotion;
 use crate::mechanics::Mechanics;
 
@@ -277,8 +275,7 @@ impl CoordinateCoupling {
     /// The value of the coordinate that follows, rad or m; `value` gives those of symbols.
     pub fn value(&self, value: &dyn Fn(ModelSymbol) -> f64) -> f64 {
         let terms = self.terms.iter();
-        let moved =
-            terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
+        let moved = terms.map(|(i, factor)| factor.evaluate(value) * value(ModelSymbol::Coordinate(*i)));
         self.offset.evaluate(value) + moved.sum::<f64>()
     }
 }

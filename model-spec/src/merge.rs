@@ -65,10 +65,7 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
         }
         // Lists of tables: entries are found by the value of their field `name`.
         (TomlValue::Array(old), TomlValue::Array(new))
-            if !new.is_empty()
-                && new
-                    .iter()
-                    .all(|entry| matches!(entry.value, TomlValue::Table(_))) =>
+            if !new.is_empty() && new.iter().all(|entry| matches!(entry.value, TomlValue::Table(_))) =>
         {
             // Entries of the variant itself never override each other.
             let n_old = old.len();
@@ -99,23 +96,17 @@ fn merge_section(section: &str, old: &mut TomlNode, new: TomlNode, log: &mut Dia
 /// The merged entry has the place of the variant, because that is where the user edits.
 fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     old.span = new.span;
-    let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value)
-    else {
+    let (TomlValue::Table(old_fields), TomlValue::Table(new_fields)) = (&mut old.value, &new.value) else {
         old.value = new.value;
         return;
     };
     // A variant that sets one alternative removes the others, such as `standard_dh` instead of `modified_dh`.
     for choice in ALTERNATIVES {
-        let sets = |table: &TomlTable, option: &[&str]| {
-            option.iter().any(|key| find_key(table, key).is_some())
-        };
+        let sets = |table: &TomlTable, option: &[&str]| option.iter().any(|key| find_key(table, key).is_some());
         // `joint` and `linear` occur in several kinds of entries, so only groups with a field on both sides matter.
         if let Some(taken) = choice.iter().find(|option| sets(new_fields, option)) {
             old_fields.retain(|(key, _)| {
-                taken.contains(&key.name.as_str())
-                    || !choice
-                        .iter()
-                        .any(|option| option.contains(&key.name.as_str()))
+                taken.contains(&key.name.as_str()) || !choice.iter().any(|option| option.contains(&key.name.as_str()))
             });
         }
     }
@@ -124,10 +115,7 @@ fn merge_entry(old: &mut TomlNode, new: TomlNode) {
     };
     // Fields of the variant replace fields of the same name.
     for (key, value) in new_fields {
-        match old_fields
-            .iter_mut()
-            .find(|(name, _)| name.name == key.name)
-        {
+        match old_fields.iter_mut().find(|(name, _)| name.name == key.name) {
             Some(field) => *field = (key, value),
             None => old_fields.push((key, value)),
         }
@@ -153,10 +141,7 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
         Some(name) => {
             let names = old.iter().filter_map(name_of);
             (
-                format!(
-                    "no `{section}` of the extended file is called `{}`",
-                    quote(name)
-                ),
+                format!("no `{section}` of the extended file is called `{}`", quote(name)),
                 names
                     .clone()
                     .next()
@@ -187,12 +172,7 @@ fn overrides_nothing(section: &str, entry: &TomlNode, old: &[TomlNode]) -> Diagn
 
 /// Adds the advice that entries without a name cannot be overridden or removed, if there are such entries. `wanted`
 /// is a text that the user may have taken for a name, such as a kind.
-fn with_unnamed(
-    diagnostic: Diagnostic,
-    section: &str,
-    entries: &[TomlNode],
-    wanted: Option<&str>,
-) -> Diagnostic {
+fn with_unnamed(diagnostic: Diagnostic, section: &str, entries: &[TomlNode], wanted: Option<&str>) -> Diagnostic {
     // An entry whose kind or frame is the wanted text is the most likely one.
     let mut unnamed = entries.iter().filter(|entry| name_of(entry).is_none());
     let says = |entry: &&TomlNode| {
@@ -244,16 +224,9 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
         let sections: Vec<String> = base.iter().map(|(key, _)| key.name.clone()).collect();
         let Some(position) = base.iter().position(|(key, _)| key.name == section) else {
             log.push(
-                Diagnostic::error(
-                    path.span,
-                    format!("there is no `{}` to remove", quote(section)),
-                )
-                .label("the extended file has no such entry")
-                .help(suggest::advice(
-                    section,
-                    "entries",
-                    sections.iter().map(String::as_str),
-                )),
+                Diagnostic::error(path.span, format!("there is no `{}` to remove", quote(section)))
+                    .label("the extended file has no such entry")
+                    .help(suggest::advice(section, "entries", sections.iter().map(String::as_str))),
             );
             continue;
         };
@@ -278,8 +251,7 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
         };
         // Uses of a removed entry are reported later with this place.
         if removed {
-            log.removed
-                .insert((section.to_owned(), name.to_owned()), path.span);
+            log.removed.insert((section.to_owned(), name.to_owned()), path.span);
         }
         // An unknown name is reported with the names that exist.
         if !removed && !log.is_full() {
@@ -307,15 +279,8 @@ fn remove_entries(base: &mut TomlTable, list: &TomlNode, log: &mut DiagnosticLog
 /// The names of all entries of a table or list.
 fn entry_names(node: &TomlNode) -> Vec<String> {
     match &node.value {
-        TomlValue::Table(table) => table
-            .iter()
-            .map(|(TomlKey { name, .. }, _)| name.clone())
-            .collect(),
-        TomlValue::Array(entries) => entries
-            .iter()
-            .filter_map(name_of)
-            .map(str::to_owned)
-            .collect(),
+        TomlValue::Table(table) => table.iter().map(|(TomlKey { name, .. }, _)| name.clone()).collect(),
+        TomlValue::Array(entries) => entries.iter().filter_map(name_of).map(str::to_owned).collect(),
         _ => Vec::new(),
     }
 }

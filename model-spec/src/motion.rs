@@ -146,11 +146,7 @@ impl Kinematics {
                 .iter()
                 .map(|p| (p.frame.0, [0, 1, 2].map(|k| p.at[k].evaluate(&value))))
                 .collect(),
-            loops: mechanism
-                .loops
-                .iter()
-                .map(|l| [l.joins[0].0, l.joins[1].0])
-                .collect(),
+            loops: mechanism.loops.iter().map(|l| [l.joins[0].0, l.joins[1].0]).collect(),
             couplings: mechanism
                 .couplings
                 .iter()
@@ -171,11 +167,7 @@ impl Kinematics {
     ///
     /// Panics unless there is one value for each coordinate.
     pub fn poses(&self, coordinates: &[f64]) -> MechanismPoses {
-        assert_eq!(
-            coordinates.len(),
-            self.n_coordinates,
-            "one value for each coordinate"
-        );
+        assert_eq!(coordinates.len(), self.n_coordinates, "one value for each coordinate");
         let mut frames: Vec<FramePlacement> = Vec::with_capacity(self.frames.len());
         // Parents come first, so each frame starts at its parent's pose.
         for (i, (parent, moves)) in self.frames.iter().enumerate() {
@@ -237,9 +229,7 @@ impl Kinematics {
     fn position(&self, poses: &MechanismPoses, point: usize) -> Vec3 {
         let (frame, at) = &self.points[point];
         let pose = &poses.frames[*frame];
-        std::array::from_fn(|k| {
-            pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * at[j]).sum::<f64>()
-        })
+        std::array::from_fn(|k| pose.origin[k] + (0..3).map(|j| pose.rotation[k][j] * at[j]).sum::<f64>())
     }
 
     /// The residuals of the constraints at the coordinates of the poses. First come the differences of the two points
@@ -285,12 +275,7 @@ impl Kinematics {
 
     /// Calls `show` for each joint that moves a point: its coordinate, and the velocity of the point for a rate of
     /// one.
-    fn visit_point_rates(
-        &self,
-        poses: &MechanismPoses,
-        point: usize,
-        show: &mut dyn FnMut(usize, Vec3),
-    ) {
+    fn visit_point_rates(&self, poses: &MechanismPoses, point: usize, show: &mut dyn FnMut(usize, Vec3)) {
         let at = self.position(poses, point);
         let mut frame = self.points[point].0;
         // Follows the chain from the point's frame to the base.
@@ -356,20 +341,15 @@ mod tests {
     #[test]
     fn agrees_with_the_nominal_pose_and_with_differences() {
         for name in ["spidermill", "three_rrr", "four_bar", "panda"] {
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
-                .join(format!("models/{name}.toml"));
+            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("models/{name}.toml"));
             let mechanism = crate::load_file(&path).unwrap().mechanism;
             let kinematics = Kinematics::new(&mechanism);
             let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
             let expected = loop_gaps(&mechanism);
-            let close = |a: &[f64], b: &[f64], by: f64| {
-                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by)
-            };
+            let close =
+                |a: &[f64], b: &[f64], by: f64| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < by);
             let poses = kinematics.poses(&q);
-            assert!(
-                close(&kinematics.gaps(&poses, &q), &expected.values, 1e-12),
-                "{name}"
-            );
+            assert!(close(&kinematics.gaps(&poses, &q), &expected.values, 1e-12), "{name}");
             // Away from the nominal pose, against differences.
             for (i, value) in q.iter_mut().enumerate() {
                 *value += 0.1 + 0.03 * f64::from(u8::try_from(i).unwrap());
@@ -385,11 +365,7 @@ mod tests {
                     gaps
                 };
                 let (high, low) = (moved(step), moved(-step));
-                let slope: Vec<f64> = high
-                    .iter()
-                    .zip(&low)
-                    .map(|(a, b)| (a - b) / (2.0 * step))
-                    .collect();
+                let slope: Vec<f64> = high.iter().zip(&low).map(|(a, b)| (a - b) / (2.0 * step)).collect();
                 let column: Vec<f64> = rows.iter().map(|row| row[i]).collect();
                 assert!(close(&column, &slope, 1e-8), "{name}, coordinate {i}");
             }

@@ -10,10 +10,7 @@ pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
     let mut rows = rows.clone();
     let n_columns = rows.first().map_or(0, Vec::len);
     // The tolerance is relative to the largest entry.
-    let largest = rows
-        .iter()
-        .flatten()
-        .fold(0.0_f64, |most, entry| most.max(entry.abs()));
+    let largest = rows.iter().flatten().fold(0.0_f64, |most, entry| most.max(entry.abs()));
     if largest == 0.0 || !largest.is_finite() {
         return 0;
     }
@@ -55,11 +52,7 @@ pub(crate) fn rank(rows: &DenseRows, tolerance: f64) -> usize {
 }
 
 /// Solves the normal equations `(J'J + damping I) x = J' r` by elimination; `None` if they are singular.
-pub(crate) fn least_squares(
-    jacobian: &DenseRows,
-    residual: &[f64],
-    damping: f64,
-) -> Option<Vec<f64>> {
+pub(crate) fn least_squares(jacobian: &DenseRows, residual: &[f64], damping: f64) -> Option<Vec<f64>> {
     let n = jacobian.first()?.len();
     // The matrix J'J with J'r as its last column.
     let mut matrix = vec![vec![0.0; n + 1]; n];

@@ -167,8 +167,7 @@ impl FormulaParser<'_> {
             if operator == Some('*') && self.peek() == Some('*') {
                 let span = self.span(self.at - 1, self.at + 1);
                 return Err(Box::new(
-                    Diagnostic::error(span, "`**` is not an operator here")
-                        .label("powers are written `^`"),
+                    Diagnostic::error(span, "`**` is not an operator here").label("powers are written `^`"),
                 ));
             }
             let (factor, factor_degree) = self.power()?;
@@ -253,16 +252,12 @@ impl FormulaParser<'_> {
         let degree = degree.saturating_mul(exponent.abs().max(1));
         if degree > LARGEST_DEGREE {
             return Err(Box::new(
-                Diagnostic::error(
-                    self.span(start, self.at),
-                    "this power of powers is too high",
-                )
-                .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
+                Diagnostic::error(self.span(start, self.at), "this power of powers is too high")
+                    .label(format!("exponents multiply to at most {LARGEST_DEGREE}")),
             ));
         }
         // Zero to a negative power is found here if the base is a number; other cases are found with values.
-        if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero())
-        {
+        if exponent < 0 && matches!(&base.kind, FormulaAstKind::Rational(value) if value.is_zero()) {
             return Err(Box::new(Diagnostic::error(
                 self.span(start, self.at),
                 "this divides by zero",
@@ -347,14 +342,9 @@ impl FormulaParser<'_> {
         // A name before a parenthesis must be a function.
         let known = FUNCTIONS.iter().map(|(function, _)| *function);
         let Some(&(_, function)) = FUNCTIONS.iter().find(|(function, _)| *function == name) else {
-            let diagnostic =
-                Diagnostic::error(span, format!("`{}` is not a function", quote(&name)))
-                    .label("expected an operator, such as `*`, before `(`, or a function");
-            return Err(Box::new(diagnostic.help(suggest::advice(
-                &name,
-                "functions",
-                known,
-            ))));
+            let diagnostic = Diagnostic::error(span, format!("`{}` is not a function", quote(&name)))
+                .label("expected an operator, such as `*`, before `(`, or a function");
+            return Err(Box::new(diagnostic.help(suggest::advice(&name, "functions", known))));
         };
         // The operand is a complete expression.
         let open = self.at;
@@ -390,11 +380,8 @@ impl FormulaParser<'_> {
             // Digits are limited, because exact numbers grow without bound.
             if digits.len() > MOST_DIGITS {
                 return Err(Box::new(
-                    Diagnostic::error(
-                        self.span(start, self.at + 1),
-                        "this number has too many digits",
-                    )
-                    .label(format!("at most {MOST_DIGITS} digits")),
+                    Diagnostic::error(self.span(start, self.at + 1), "this number has too many digits")
+                        .label(format!("at most {MOST_DIGITS} digits")),
                 ));
             }
             self.at += 1;
@@ -416,11 +403,8 @@ impl FormulaParser<'_> {
                     }
                     _ => {
                         return Err(Box::new(
-                            Diagnostic::error(
-                                self.span(start, self.at),
-                                "the exponent of this number is out of range",
-                            )
-                            .label(format!("between e-{0} and e{0}", 2 * LARGEST_EXPONENT)),
+                            Diagnostic::error(self.span(start, self.at), "the exponent of this number is out of range")
+                                .label(format!("between e-{0} and e{0}", 2 * LARGEST_EXPONENT)),
                         ));
                     }
                 }
@@ -429,8 +413,7 @@ impl FormulaParser<'_> {
         // A lone point has no digits.
         let Ok(value) = digits.parse::<BigInt>() else {
             return Err(Box::new(
-                Diagnostic::error(self.span(start, self.at), "this is not a number")
-                    .label("expected digits"),
+                Diagnostic::error(self.span(start, self.at), "this is not a number").label("expected digits"),
             ));
         };
         // The exact value: an integer times or over a power of ten.
@@ -455,11 +438,8 @@ impl FormulaParser<'_> {
         }
         // The text ends; the mark is on the opening parenthesis.
         Err(Box::new(
-            Diagnostic::error(
-                self.span(open, open + 1),
-                "this parenthesis is never closed",
-            )
-            .label("expected a `)` further on"),
+            Diagnostic::error(self.span(open, open + 1), "this parenthesis is never closed")
+                .label("expected a `)` further on"),
         ))
     }
 
@@ -497,9 +477,7 @@ impl FormulaParser<'_> {
             ',' => diagnostic
                 .label("a comma cannot stand here: decimals have a point, functions have one operand")
                 .help("write decimals with a point (`0.5`), one expression per entry: `[\"ax\", \"-ay\"]`"),
-            _ if found.is_alphanumeric() || found == '(' => {
-                diagnostic.label("expected an operator: `+ - * / ^`")
-            }
+            _ if found.is_alphanumeric() || found == '(' => diagnostic.label("expected an operator: `+ - * / ^`"),
             _ => diagnostic.label("expected a number, a name or a parenthesis"),
         })
     }
@@ -517,14 +495,11 @@ impl FormulaParser<'_> {
             end += self.text[end..].chars().next().map_or(1, char::len_utf8);
         }
         Box::new(
-            Diagnostic::error(
-                self.span(start, end.max(start + 1)),
-                "this exponent is not allowed",
-            )
-            .label(format!(
-                "expected an integer between -{LARGEST_EXPONENT} and {LARGEST_EXPONENT}"
-            ))
-            .help("write `sqrt(x)` for a square root"),
+            Diagnostic::error(self.span(start, end.max(start + 1)), "this exponent is not allowed")
+                .label(format!(
+                    "expected an integer between -{LARGEST_EXPONENT} and {LARGEST_EXPONENT}"
+                ))
+                .help("write `sqrt(x)` for a square root"),
         )
     }
 
@@ -558,20 +533,13 @@ impl FormulaParser<'_> {
 fn negative(ast: FormulaAst, span: SourceSpan) -> FormulaAst {
     let kind = match ast.kind {
         FormulaAstKind::Rational(value) => FormulaAstKind::Rational(-value),
-        kind => FormulaAstKind::Negative(Box::new(FormulaAst {
-            span: ast.span,
-            kind,
-        })),
+        kind => FormulaAstKind::Negative(Box::new(FormulaAst { span: ast.span, kind })),
     };
     FormulaAst { span, kind }
 }
 
 /// Makes `a*c/(b*d)` of the chain `a/b*c/d` and collects its numbers into one, so that the tree is not deep.
-fn fraction(
-    above: Vec<FormulaAst>,
-    below: Vec<FormulaAst>,
-    span: SourceSpan,
-) -> ParseResult<FormulaAst> {
+fn fraction(above: Vec<FormulaAst>, below: Vec<FormulaAst>, span: SourceSpan) -> ParseResult<FormulaAst> {
     let mut number = BigRational::one();
     let mut numerator = Vec::new();
     let mut denominator = Vec::new();
@@ -587,8 +555,7 @@ fn fraction(
         match factor.kind {
             FormulaAstKind::Rational(value) if value.is_zero() => {
                 return Err(Box::new(
-                    Diagnostic::error(factor.span, "this divides by zero")
-                        .label("must not be zero"),
+                    Diagnostic::error(factor.span, "this divides by zero").label("must not be zero"),
                 ));
             }
             FormulaAstKind::Rational(value) => number /= value,

@@ -22,11 +22,7 @@ const SINGULAR: f64 = 1e-8;
 const DEPENDENCE_TOLERANCE: f64 = 1e-5;
 
 /// Checks the nominal pose and refines the passive coordinates there. Each check needs the ones before it.
-pub(crate) fn check_pose(
-    mechanism: &mut Mechanism,
-    places: &MechanismSpans,
-    log: &mut DiagnosticLog,
-) {
+pub(crate) fn check_pose(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) {
     // Values that are not finite would make all other checks fail.
     if !check_finite(mechanism, places, log) {
         return;
@@ -73,10 +69,7 @@ pub(crate) fn loop_gaps(mechanism: &Mechanism) -> LoopGaps {
     }
     // The size of the mechanism is the scale of all tolerances.
     for pose in &poses {
-        found.size = pose
-            .origin
-            .iter()
-            .fold(found.size, |size, x| size.max(x.abs()));
+        found.size = pose.origin.iter().fold(found.size, |size, x| size.max(x.abs()));
     }
     // One row per coupling: the coordinate minus what it follows.
     let value = |symbol: ModelSymbol| mechanism.symbol_nominal(symbol);
@@ -134,7 +127,9 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             log.push(
                 Diagnostic::error(span, format!("{what} has no finite value"))
                     .label("with the constants of this file")
-                    .help("look for a division by zero, the root of a negative number, or a value that is far too large"),
+                    .help(
+                        "look for a division by zero, the root of a negative number, or a value that is far too large",
+                    ),
             );
         }
     };
@@ -147,10 +142,7 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             FrameStep::Free(_) => true,
         });
         if !finite {
-            report(
-                places.frames.get(i).copied().flatten(),
-                "the place of this frame",
-            );
+            report(places.frames.get(i).copied().flatten(), "the place of this frame");
         }
     }
     // Points: all entries of their positions.
@@ -177,11 +169,7 @@ fn check_finite(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
 /// values.
 ///
 /// The nominal values of the passive coordinates in `mechanism` are the result.
-fn close_loops(
-    mechanism: &mut Mechanism,
-    places: &MechanismSpans,
-    log: &mut DiagnosticLog,
-) -> bool {
+fn close_loops(mechanism: &mut Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     if mechanism.loops.is_empty() {
         return true;
     }
@@ -189,10 +177,7 @@ fn close_loops(
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
     // The given values are kept, to measure how far the coordinates moved.
-    let given: Vec<f64> = passive
-        .iter()
-        .map(|&i| mechanism.coordinates[i].nominal)
-        .collect();
+    let given: Vec<f64> = passive.iter().map(|&i| mechanism.coordinates[i].nominal).collect();
     let ClosureResidual { gaps: now, size } = move_passive(mechanism, &passive);
     // Each loop that stays open is reported with its gap.
     let mut closes = true;
@@ -203,9 +188,7 @@ fn close_loops(
             continue;
         }
         closes = false;
-        let [one, other] = closed
-            .joins
-            .map(|point| mechanism.points[point.0].name.as_str());
+        let [one, other] = closed.joins.map(|point| mechanism.points[point.0].name.as_str());
         log.push(
             Diagnostic::error(
                 places.loops[i],
@@ -233,10 +216,7 @@ fn close_loops(
                     coordinate.name
                 ),
             )
-            .label(format!(
-                "it stays {gap:.3} {} away",
-                coordinate.motion.unit()
-            ))
+            .label(format!("it stays {gap:.3} {} away", coordinate.motion.unit()))
             .help("check what it follows, and the nominal values of the coordinates of the loops"),
         );
     }
@@ -280,10 +260,7 @@ fn move_passive(mechanism: &mut Mechanism, passive: &[usize]) -> ClosureResidual
             continue;
         };
         // Take the step, and keep it only if the residual decreases.
-        let before: Vec<f64> = passive
-            .iter()
-            .map(|&i| mechanism.coordinates[i].nominal)
-            .collect();
+        let before: Vec<f64> = passive.iter().map(|&i| mechanism.coordinates[i].nominal).collect();
         for (&i, change) in passive.iter().zip(&step) {
             mechanism.coordinates[i].nominal -= change;
         }
@@ -362,9 +339,7 @@ fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
     for closed in &mechanism.loops {
         // Both Jacobians are taken at the position of the first point.
         let at = position(mechanism, &poses, closed.joins[0]);
-        let [left, right] = closed
-            .joins
-            .map(|point| jacobian(mechanism, &poses, point, at));
+        let [left, right] = closed.joins.map(|point| jacobian(mechanism, &poses, point, at));
         for (left, right) in left.iter().zip(&right) {
             rows.push(left.iter().zip(right).map(|(a, b)| a - b).collect());
         }
@@ -374,11 +349,7 @@ fn constraint_rows(mechanism: &Mechanism) -> DenseRows {
 }
 
 /// Checks that the loops do not constrain more coordinates than are passive, and that some coordinate is independent.
-fn check_constraint_count(
-    mechanism: &Mechanism,
-    places: &MechanismSpans,
-    log: &mut DiagnosticLog,
-) -> bool {
+fn check_constraint_count(mechanism: &Mechanism, places: &MechanismSpans, log: &mut DiagnosticLog) -> bool {
     let passive: Vec<usize> = (0..mechanism.coordinates.len())
         .filter(|&i| mechanism.coordinates[i].passive)
         .collect();
@@ -408,9 +379,7 @@ fn check_constraint_count(
         log.push(
             Diagnostic::error(span, "all coordinates are passive")
                 .label("expected at least one independent coordinate")
-                .help(
-                    "remove `passive` where a drive acts, or write `driven = false` where nothing does",
-                ),
+                .help("remove `passive` where a drive acts, or write `driven = false` where nothing does"),
         );
         return false;
     }
@@ -494,10 +463,7 @@ fn check_passive(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagn
     let i = left_over.map_or(passive[0], |(_, &i)| i);
     let diagnostic = Diagnostic::error(
         places.coordinates[i],
-        format!(
-            "the loops do not determine `{}`",
-            mechanism.coordinates[i].name
-        ),
+        format!("the loops do not determine `{}`", mechanism.coordinates[i].name),
     );
     // If the equations are enough, only the pose is singular; otherwise a loop is missing.
     log.push(if equations > settled {
@@ -531,10 +497,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             DriveKind::Joint(coordinate) => row[coordinate.0] = 1.0,
             DriveKind::Linear { from, to } => {
                 // The rate of a linear drive is the velocity of its end relative to its start, along the drive.
-                let (start, end) = (
-                    position(mechanism, &poses, from),
-                    position(mechanism, &poses, to),
-                );
+                let (start, end) = (position(mechanism, &poses, from), position(mechanism, &poses, to));
                 // A linear drive without a length has no direction.
                 let along: Vec3 = std::array::from_fn(|k| end[k] - start[k]);
                 let length = norm(&along);
@@ -542,10 +505,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
                     log.push(
                         Diagnostic::error(
                             places.drives[i],
-                            format!(
-                                "the drive `{}` has no length at the nominal pose",
-                                drive.name
-                            ),
+                            format!("the drive `{}` has no length at the nominal pose", drive.name),
                         )
                         .label("its two points coincide there, so its force has no direction"),
                     );
@@ -585,11 +545,7 @@ fn check_drives(mechanism: &Mechanism, places: &MechanismSpans, log: &mut Diagno
             return;
         };
         for (row, through) in total.iter_mut().zip(&through) {
-            row[j] += through
-                .iter()
-                .zip(&passive_rates)
-                .map(|(a, b)| a * b)
-                .sum::<f64>();
+            row[j] += through.iter().zip(&passive_rates).map(|(a, b)| a * b).sum::<f64>();
         }
     }
     // Lengths and angles have different units, so each row is scaled to length one.

@@ -39,10 +39,7 @@ impl ExactExpression {
             Self::Pi => std::f64::consts::PI,
             Self::Symbol(symbol) => value(*symbol),
             Self::Sum(terms) => terms.iter().map(|term| term.evaluate(value)).sum(),
-            Self::Product(factors) => factors
-                .iter()
-                .map(|factor| factor.evaluate(value))
-                .product(),
+            Self::Product(factors) => factors.iter().map(|factor| factor.evaluate(value)).product(),
             Self::Quotient(above, below) => above.evaluate(value) / below.evaluate(value),
             Self::Negative(inner) => -inner.evaluate(value),
             Self::Power(base, exponent) => base.evaluate(value).powi(*exponent),
@@ -127,9 +124,7 @@ impl ExactLength {
             + self
                 .coordinates
                 .iter()
-                .map(|(coordinate, factor)| {
-                    to_f64(factor) * value(ModelSymbol::Coordinate(*coordinate))
-                })
+                .map(|(coordinate, factor)| to_f64(factor) * value(ModelSymbol::Coordinate(*coordinate)))
                 .sum::<f64>()
     }
 
@@ -284,9 +279,7 @@ fn print_sum(terms: &[ExactExpression], name: &dyn Fn(ModelSymbol) -> String, te
                 }
                 // A sign is allowed without parentheses only at the start of the sum.
                 let inner = match term {
-                    ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => {
-                        OperandPrecedence::Sum
-                    }
+                    ExactExpression::Negative(_) | ExactExpression::Rational(_) if i == 0 => OperandPrecedence::Sum,
                     _ => OperandPrecedence::Product,
                 };
                 print_expression(term, inner, name, text);

@@ -46,12 +46,7 @@ fn into_frame(pose: &FramePose, v: Vec3) -> Vec3 {
 }
 
 /// Angular velocity and velocity of the origin of a frame, in the base frame.
-fn velocity(
-    mechanism: &Mechanism,
-    poses: &[FramePose],
-    frame: usize,
-    rates: &[f64],
-) -> (Vec3, Vec3) {
+fn velocity(mechanism: &Mechanism, poses: &[FramePose], frame: usize, rates: &[f64]) -> (Vec3, Vec3) {
     let at = poses[frame].origin;
     let (mut angular, mut linear) = ([0.0; 3], [0.0; 3]);
     let mut up = frame;
@@ -87,10 +82,7 @@ fn draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> Vec<
 fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> Option<Vec<f64>> {
     let closed = !mechanism.loops.is_empty();
     let spread = if closed { 0.3 } else { 2.0 };
-    let targets: Vec<f64> = nominal
-        .iter()
-        .map(|value| value + spread * random.next())
-        .collect();
+    let targets: Vec<f64> = nominal.iter().map(|value| value + spread * random.next()).collect();
     let mut rates: Vec<f64> = nominal.iter().map(|_| random.next()).collect();
     let passive: Vec<usize> = (0..nominal.len())
         .filter(|&i| mechanism.coordinates[i].passive)
@@ -112,11 +104,7 @@ fn try_draw(mechanism: &mut Mechanism, nominal: &[f64], random: &mut Random) -> 
                 }
             }
         }
-        if loop_gaps(mechanism)
-            .values
-            .iter()
-            .any(|gap| gap.abs() > 1e-12)
-        {
+        if loop_gaps(mechanism).values.iter().any(|gap| gap.abs() > 1e-12) {
             return None;
         }
     }
@@ -146,9 +134,8 @@ fn of_passive(rows: &DenseRows, passive: &[usize]) -> DenseRows {
 /// Kinetic plus potential energy per unit of each parameter.
 fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
     let poses = frame_poses(mechanism);
-    let gravity: Vec3 = std::array::from_fn(|k| {
-        mechanism.gravity[k].evaluate(&|symbol| mechanism.symbol_nominal(symbol))
-    });
+    let gravity: Vec3 =
+        std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|symbol| mechanism.symbol_nominal(symbol)));
     let mut row = vec![0.0; mechanism.parameters.len()];
     for (i, energy) in row.iter_mut().enumerate() {
         let unit = |symbol: ModelSymbol| match symbol {
@@ -158,10 +145,7 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
         let value = |exact: &ExactExpression| exact.evaluate(&unit);
         let mut body = |frame: usize, mass: f64, first: Vec3, inertia: [f64; 6]| {
             let (angular, linear) = velocity(mechanism, &poses, frame, rates);
-            let (w, v) = (
-                into_frame(&poses[frame], angular),
-                into_frame(&poses[frame], linear),
-            );
+            let (w, v) = (into_frame(&poses[frame], angular), into_frame(&poses[frame], linear));
             let [xx, xy, xz, yy, yz, zz] = inertia;
             let momentum = [
                 xx * w[0] + xy * w[1] + xz * w[2],
@@ -193,20 +177,8 @@ fn energies(mechanism: &Mechanism, rates: &[f64]) -> Vec<f64> {
             let mass = value(&lumped.mass);
             let at: Vec3 = std::array::from_fn(|k| value(&lumped.force_at[k]));
             let [x, y, z] = at;
-            let inertia = [
-                y * y + z * z,
-                -x * y,
-                -x * z,
-                x * x + z * z,
-                -y * z,
-                x * x + y * y,
-            ];
-            body(
-                lumped.frame.0,
-                mass,
-                at.map(|x| x * mass),
-                inertia.map(|x| x * mass),
-            );
+            let inertia = [y * y + z * z, -x * y, -x * z, x * x + z * z, -y * z, x * x + y * y];
+            body(lumped.frame.0, mass, at.map(|x| x * mass), inertia.map(|x| x * mass));
         }
     }
     for effect in &mechanism.effects {
@@ -231,11 +203,7 @@ fn n_base_parameters(path: &str) -> usize {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
     let loaded = crate::load_file(&path).unwrap_or_else(|failure| panic!("{failure}"));
     let mut mechanism = loaded.mechanism;
-    let nominal: Vec<f64> = mechanism
-        .coordinates
-        .iter()
-        .map(|one| one.nominal)
-        .collect();
+    let nominal: Vec<f64> = mechanism.coordinates.iter().map(|one| one.nominal).collect();
     let mut random = Random(0x0123_4567_89ab_cdef);
     let n_samples = 2 * mechanism.parameters.len() + 10;
     let mut rows: DenseRows = Vec::new();
@@ -310,8 +278,7 @@ fn the_spidermill_has_its_m_shape() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("models/spidermill.toml");
     let mechanism = crate::load_file(&path).unwrap().mechanism;
     let poses = frame_poses(&mechanism);
-    let [elbow, other, platform] =
-        [0, 1, 2].map(|i| position(&mechanism, &poses, crate::PointIdx(i)));
+    let [elbow, other, platform] = [0, 1, 2].map(|i| position(&mechanism, &poses, crate::PointIdx(i)));
     assert!(platform[1] < elbow[1] && (elbow[1] - other[1]).abs() < 1e-6);
     assert!((platform[0] - 0.45).abs() < 1e-6);
 }

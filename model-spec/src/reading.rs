@@ -13,12 +13,10 @@ use crate::load::LoadFailure;
 ///
 /// Fails when the file cannot be read, exceeds [`LARGEST_FILE`] bytes, or is not UTF-8.
 pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<String, LoadFailure> {
-    let bytes = files
-        .read(path, LARGEST_FILE as u64)
-        .map_err(|error| LoadFailure {
-            diagnostics: vec![unreadable_file(&error, advice)],
-            sources: SourceFiles::default(),
-        })?;
+    let bytes = files.read(path, LARGEST_FILE as u64).map_err(|error| LoadFailure {
+        diagnostics: vec![unreadable_file(&error, advice)],
+        sources: SourceFiles::default(),
+    })?;
     String::from_utf8(bytes).map_err(|error| invalid_utf8(path, error.as_bytes()))
 }
 
@@ -26,11 +24,7 @@ pub fn read_text(files: &dyn FileSource, path: &Path, advice: &str) -> Result<St
 ///
 /// Errors are one line and quote nothing of the text. A model file from someone else must not reveal the contents of
 /// other files on the reader's disk.
-pub fn read_referenced(
-    files: &dyn FileSource,
-    path: &Path,
-    keys: &[&str],
-) -> Result<String, FileError> {
+pub fn read_referenced(files: &dyn FileSource, path: &Path, keys: &[&str]) -> Result<String, FileError> {
     let text = files.read_text(path, LARGEST_FILE as u64)?;
     // A file with syntax errors is accepted here; the reader of the file reports them.
     let (table, _) = DeTable::parse_recoverable(&text);
@@ -68,11 +62,7 @@ fn invalid_utf8(path: &Path, bytes: &[u8]) -> LoadFailure {
     // The lossy text has a replacement character at the invalid byte, which the span covers.
     let text = String::from_utf8_lossy(bytes).into_owned();
     let end = (start + char::REPLACEMENT_CHARACTER.len_utf8()).min(text.len());
-    let span = SourceSpan {
-        file: 0,
-        start,
-        end,
-    };
+    let span = SourceSpan { file: 0, start, end };
     LoadFailure {
         diagnostics: vec![
             Diagnostic::error(span, "this file is not UTF-8 text")

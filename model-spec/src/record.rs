@@ -32,12 +32,9 @@ pub(crate) trait SchemaValue: Sized {
 /// Reports a value of the wrong type.
 pub(crate) fn wrong_type<T: SchemaValue>(node: &TomlNode, log: &mut DiagnosticLog) -> Option<T> {
     log.push(
-        Diagnostic::error(
-            node.span,
-            format!("{} stands where it does not belong", node.kind()),
-        )
-        .label(format!("expected {}", T::EXPECTED))
-        .help(format!("for example `{}`", T::EXAMPLE)),
+        Diagnostic::error(node.span, format!("{} stands where it does not belong", node.kind()))
+            .label(format!("expected {}", T::EXPECTED))
+            .help(format!("for example `{}`", T::EXAMPLE)),
     );
     None
 }
@@ -168,8 +165,7 @@ pub(crate) fn read_field<T: SchemaValue>(
     // An unknown key close to this one is reported as misspelt, so it is not reported as missing as well.
     let misspelt = |keys: &[&str]| {
         table.iter().take(MOST_ENTRIES).any(|(other, _)| {
-            !keys.contains(&other.name.as_str())
-                && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
+            !keys.contains(&other.name.as_str()) && suggest::nearest(&other.name, keys.iter().copied()) == Some(key)
         })
     };
     if let Some(keys) = required_of
@@ -234,12 +230,9 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         let TomlValue::Array(array) = &node.value else {
             log.push(
-                Diagnostic::error(
-                    node.span,
-                    format!("{} stands where it does not belong", node.kind()),
-                )
-                .label(format!("expected a list, each entry {}", T::EXPECTED))
-                .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
+                Diagnostic::error(node.span, format!("{} stands where it does not belong", node.kind()))
+                    .label(format!("expected a list, each entry {}", T::EXPECTED))
+                    .help("lists of tables are headed by double brackets, `[[frame]]`; short ones stand in `[ ]`"),
             );
             return None;
         };
@@ -250,10 +243,7 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
         // Faulty entries are detected by the number of errors that reading them adds.
         let n_errors = log.n_errors();
         Some(Self {
-            entries: array
-                .iter()
-                .filter_map(|entry| T::read(entry, log))
-                .collect(),
+            entries: array.iter().filter_map(|entry| T::read(entry, log)).collect(),
             span: node.span,
             faulty: log.n_errors() > n_errors,
         })
@@ -264,8 +254,7 @@ impl<T: SchemaValue> SchemaValue for EntryList<T> {
 fn too_many(n: usize, span: SourceSpan, log: &mut DiagnosticLog) -> bool {
     if n > MOST_ENTRIES {
         log.push(
-            Diagnostic::error(span, format!("there are {n} entries here"))
-                .label(format!("at most {MOST_ENTRIES}")),
+            Diagnostic::error(span, format!("there are {n} entries here")).label(format!("at most {MOST_ENTRIES}")),
         );
     }
     n > MOST_ENTRIES

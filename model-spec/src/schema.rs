@@ -7,8 +7,8 @@ use crate::range::ValueRange;
 use crate::record::{EntryList, NamedEntries, OneOrMany, record};
 use crate::unit::ModelUnit;
 use crate::values::{
-    AxisName, BooleanFlag, FormulaVector, LumpedMassPlace, NameSuffix, QuaternionOrder,
-    SchemaVersion, SearchEntry, SpannedName, SpannedNumber, SpannedText, TwistName, UnitByPlace,
+    AxisName, BooleanFlag, FormulaVector, LumpedMassPlace, NameSuffix, QuaternionOrder, SchemaVersion, SearchEntry,
+    SpannedName, SpannedNumber, SpannedText, TwistName, UnitByPlace,
 };
 
 record! {

@@ -79,25 +79,14 @@ pub(crate) struct FormulaRequirement<'a> {
 
 impl FormulaScope {
     /// Adds a name; a second definition or a reserved word is reported and gives false.
-    pub(crate) fn declare(
-        &mut self,
-        name: &str,
-        meaning: SymbolMeaning,
-        log: &mut DiagnosticLog,
-    ) -> bool {
+    pub(crate) fn declare(&mut self, name: &str, meaning: SymbolMeaning, log: &mut DiagnosticLog) -> bool {
         // A second definition is reported with the place of the first one.
         if let (Some(span), Some(first)) = (meaning.declared, self.names.get(name)) {
-            let mut diagnostic =
-                Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
-                    .label(format!("defined here as {}", meaning.sort.name()))
-                    .help(
-                        "constants, parameters and coordinates share one set of names; rename one",
-                    );
+            let mut diagnostic = Diagnostic::error(span, format!("`{}` is defined twice", quote(name)))
+                .label(format!("defined here as {}", meaning.sort.name()))
+                .help("constants, parameters and coordinates share one set of names; rename one");
             if let Some(first_span) = first.declared {
-                diagnostic = diagnostic.related(
-                    first_span,
-                    format!("first defined as {}", first.sort.name()),
-                );
+                diagnostic = diagnostic.related(first_span, format!("first defined as {}", first.sort.name()));
             }
             log.push(diagnostic);
             return false;
@@ -119,9 +108,7 @@ impl FormulaScope {
 
     /// All names in alphabetical order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&str, &SymbolMeaning)> {
-        self.names
-            .iter()
-            .map(|(name, meaning)| (name.as_str(), meaning))
+        self.names.iter().map(|(name, meaning)| (name.as_str(), meaning))
     }
 
     /// The quantity of a name, which is marked as used. Unknown names and other sorts are reported.
@@ -142,11 +129,7 @@ impl FormulaScope {
                 .map(|(name, _)| name.as_str())
         };
         // The list of sorts for the label, such as `a constant or a parameter`.
-        let list = sorts
-            .iter()
-            .map(|sort| sort.name())
-            .collect::<Vec<_>>()
-            .join(" or ");
+        let list = sorts.iter().map(|sort| sort.name()).collect::<Vec<_>>().join(" or ");
         let Some(meaning) = self.names.get(name) else {
             if !log.is_full() {
                 // Candidates are collected only if the finding will be kept: large files with many faults stay fast.
@@ -155,9 +138,7 @@ impl FormulaScope {
                 log.push(
                     Diagnostic::error(span, format!("unknown name `{}`", quote(name)))
                         .label(format!("expected {list}"))
-                        .with_removal_or(removal, || {
-                            suggest::advice(name, "names", candidates.iter().copied())
-                        }),
+                        .with_removal_or(removal, || suggest::advice(name, "names", candidates.iter().copied())),
                 );
             }
             return None;
@@ -167,10 +148,7 @@ impl FormulaScope {
         if !sorts.contains(&meaning.sort) {
             let diagnostic = Diagnostic::error(
                 span,
-                format!(
-                    "`{name}` is {}, which cannot stand here",
-                    meaning.sort.name()
-                ),
+                format!("`{name}` is {}, which cannot stand here", meaning.sort.name()),
             )
             .label(format!("expected {list}"));
             log.push(match meaning.declared {
@@ -199,16 +177,13 @@ impl FormulaScope {
             && found != wanted.dimension
         {
             log.push(
-                Diagnostic::error(
-                    formula.ast.span,
-                    format!("{} has the wrong unit", wanted.what),
-                )
-                .label(format!(
-                    "expected {}, found {}",
-                    wanted.dimension.describe(),
-                    found.describe()
-                ))
-                .help("check the units of the names in it, and whether a factor is missing"),
+                Diagnostic::error(formula.ast.span, format!("{} has the wrong unit", wanted.what))
+                    .label(format!(
+                        "expected {}, found {}",
+                        wanted.dimension.describe(),
+                        found.describe()
+                    ))
+                    .help("check the units of the names in it, and whether a factor is missing"),
             );
         }
         (log.n_errors() == before).then_some(exact)
@@ -241,9 +216,7 @@ impl FormulaScope {
     ) -> Option<(ExactExpression, Option<UnitDimension>)> {
         // Bare numbers fit any dimension.
         match &ast.kind {
-            FormulaAstKind::Rational(value) => {
-                Some((ExactExpression::Rational(value.clone()), None))
-            }
+            FormulaAstKind::Rational(value) => Some((ExactExpression::Rational(value.clone()), None)),
             FormulaAstKind::Pi => Some((ExactExpression::Pi, None)),
             FormulaAstKind::Name(name) => {
                 let meaning = self.look_up(name, ast.span, sorts, log)?;
@@ -268,11 +241,7 @@ impl FormulaScope {
                             log.push(
                                 Diagnostic::error(
                                     term.span,
-                                    format!(
-                                        "{} and {} cannot be added",
-                                        first.describe(),
-                                        found.describe()
-                                    ),
+                                    format!("{} and {} cannot be added", first.describe(), found.describe()),
                                 )
                                 .label(format!("this is {}", found.describe()))
                                 .related(first_span, format!("this is {}", first.describe())),
@@ -296,8 +265,7 @@ impl FormulaScope {
                     };
                     product.push(exact);
                     if let Some(found) = found {
-                        dimension =
-                            Some(dimension.map_or(found, |before| before.multiplied_by(found)));
+                        dimension = Some(dimension.map_or(found, |before| before.multiplied_by(found)));
                     }
                 }
                 (!faulty).then_some((ExactExpression::Product(product), dimension))
@@ -316,10 +284,7 @@ impl FormulaScope {
                             .divided_by(lower.unwrap_or(UnitDimension::ONE)),
                     ),
                 };
-                Some((
-                    ExactExpression::Quotient(Box::new(above), Box::new(below)),
-                    dimension,
-                ))
+                Some((ExactExpression::Quotient(Box::new(above), Box::new(below)), dimension))
             }
             FormulaAstKind::Negative(inner) => {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
@@ -336,10 +301,7 @@ impl FormulaScope {
             FormulaAstKind::Apply(function, inner) => {
                 let (exact, dimension) = self.resolve_ast(inner, sorts, log)?;
                 let dimension = function_dimension(*function, dimension, inner.span, log)?;
-                Some((
-                    ExactExpression::Apply(*function, Box::new(exact)),
-                    dimension,
-                ))
+                Some((ExactExpression::Apply(*function, Box::new(exact)), dimension))
             }
         }
     }
@@ -369,10 +331,7 @@ fn function_dimension(
             }
             root.map(Some)
         }
-        (
-            ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp,
-            operand,
-        ) => {
+        (ExactFunction::Sin | ExactFunction::Cos | ExactFunction::Tanh | ExactFunction::Exp, operand) => {
             // All other functions need a pure number or an angle.
             if let Some(found) = operand
                 && found != UnitDimension::ONE

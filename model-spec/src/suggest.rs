@@ -8,10 +8,7 @@ const LONGEST_COMPARED: usize = 60;
 /// The candidate nearest to `name`, if it is near enough to be meant.
 /// A name may differ in a third of its characters, but in at least one and at most four. Names longer than
 /// [`LONGEST_COMPARED`] bytes have no suggestion.
-pub(crate) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(crate) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     if name.len() > LONGEST_COMPARED {
         return None;
     }
@@ -29,11 +26,7 @@ pub(crate) fn nearest<'a>(
 
 /// `did you mean ...?` for the nearest candidate, or the complete list if it is short.
 /// `what` names the sort of candidates in the plural. At most 16 of them are listed.
-pub(crate) fn advice<'a>(
-    name: &str,
-    what: &str,
-    candidates: impl IntoIterator<Item = &'a str> + Clone,
-) -> String {
+pub(crate) fn advice<'a>(name: &str, what: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     if let Some(found) = nearest(name, candidates.clone()) {
         return format!("did you mean `{found}`?");
     }
@@ -44,11 +37,7 @@ pub(crate) fn advice<'a>(
     }
     let n = all.len();
     all.truncate(16);
-    let list = all
-        .iter()
-        .map(|one| format!("`{one}`"))
-        .collect::<Vec<_>>()
-        .join(", ");
+    let list = all.iter().map(|one| format!("`{one}`")).collect::<Vec<_>>().join(", ");
     let more = if n > all.len() { ", ..." } else { "" };
     format!("known {what}: {list}{more}")
 }
@@ -66,9 +55,7 @@ fn distance(one: &str, other: &str) -> usize {
         let mut row = vec![i];
         for j in 1..=other.len() {
             let same = one[i - 1].eq_ignore_ascii_case(&other[j - 1]);
-            let mut best = (last[j - 1] + usize::from(!same))
-                .min(last[j] + 1)
-                .min(row[j - 1] + 1);
+            let mut best = (last[j - 1] + usize::from(!same)).min(last[j] + 1).min(row[j - 1] + 1);
             // Two neighbouring characters are swapped.
             if i > 1 && j > 1 && one[i - 1] == other[j - 2] && one[i - 2] == other[j - 1] {
                 best = best.min(before_last[j - 2] + 1);

@@ -83,9 +83,7 @@ fn head_of_table(rest: &str) -> Option<usize> {
         .or_else(|| line.strip_prefix('[')?.strip_suffix(']'))?
         .trim();
     let is_name = name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
-        && name
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
+        && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c));
     // `[true]` on a line of its own can be an element of an array.
     let is_value = ["true", "false", "inf", "nan"].contains(&name);
     (is_name && !is_value).then_some(line.len())
@@ -133,15 +131,9 @@ mod tests {
     #[test]
     fn brackets_without_partners_are_found() {
         check("a = { b = 1\n[c]\n", Some("{ b = 1\n[c]\n"));
-        check(
-            "a = [1, 2\n\n[[c]] # x\nd = [1]",
-            Some("[1, 2\n\n[[c]] # x\nd = [1]"),
-        );
+        check("a = [1, 2\n\n[[c]] # x\nd = [1]", Some("[1, 2\n\n[[c]] # x\nd = [1]"));
         check("a = [{ b = [1, }]\n", None);
-        check(
-            "a = [\n  [1],\n  [true]\n]\n[b]\nc = { d = \"}{\\\"{\" }",
-            None,
-        );
+        check("a = [\n  [1],\n  [true]\n]\n[b]\nc = { d = \"}{\\\"{\" }", None);
         check("a = \'{\' # {\nb = \"\"\"{\n[c]\n\"\"\"", None);
         check("a = 1\nb = [", Some("["));
         check("a = \"x\nb = { [", None);

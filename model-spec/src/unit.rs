@@ -112,16 +112,12 @@ impl UnitDimension {
 
     /// The dimension of a product.
     pub(crate) fn multiplied_by(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            self.0[i].saturating_add(other.0[i])
-        }))
+        Self(std::array::from_fn(|i| self.0[i].saturating_add(other.0[i])))
     }
 
     /// The dimension of a quotient.
     pub(crate) fn divided_by(self, other: Self) -> Self {
-        Self(std::array::from_fn(|i| {
-            self.0[i].saturating_sub(other.0[i])
-        }))
+        Self(std::array::from_fn(|i| self.0[i].saturating_sub(other.0[i])))
     }
 
     /// The dimension of an integer power.
@@ -160,10 +156,7 @@ impl UnitDimension {
 /// Prints the common unit, or powers of the base units.
 impl std::fmt::Display for UnitDimension {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if let Some((unit, _, _)) = PRINTED
-            .iter()
-            .find(|(_, single, _)| Self::new(*single) == *self)
-        {
+        if let Some((unit, _, _)) = PRINTED.iter().find(|(_, single, _)| Self::new(*single) == *self) {
             return f.write_str(unit);
         }
         let mut blank = "";
@@ -220,9 +213,8 @@ impl ModelUnit {
             end: inner + fault.end,
         });
         let found = &text[fault.start..fault.end];
-        let mut diagnostic = Diagnostic::error(place, fault.message).label(
-            "expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`",
-        );
+        let mut diagnostic = Diagnostic::error(place, fault.message)
+            .label("expected SI units such as `kg`, `m`, `rad`, `kg m^2`, `N s/m`, `m/s^2`, or `1`");
         // Prefixed units are refused, because no factor is ever applied.
         if let Some((_, si)) = FOREIGN.iter().find(|(foreign, _)| *foreign == found) {
             diagnostic = diagnostic.help(format!(
@@ -316,9 +308,7 @@ fn parse_unit(text: &str) -> Result<UnitDimension, UnitFault> {
         let offset = above.len() + 1;
         // A bracket counts as one divisor.
         let trimmed = below.trim();
-        let bracket = trimmed
-            .strip_prefix('(')
-            .and_then(|rest| rest.strip_suffix(')'));
+        let bracket = trimmed.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
         let (divisor, n_factors) = if let Some(inner) = bracket {
             let skip = below.find('(').unwrap_or(0) + 1;
             (factors(inner, offset + skip)?.0, 1)
@@ -373,10 +363,7 @@ fn factors(text: &str, offset: usize) -> Result<(UnitDimension, usize), UnitFaul
             return Err(fault(format!("unknown unit `{}`", quote(name)), name.len()));
         };
         let Some(exponent) = exponent.filter(|exponent| exponent.abs() <= 9) else {
-            return Err(fault(
-                format!("this exponent of `{name}` is not allowed"),
-                word.len(),
-            ));
+            return Err(fault(format!("this exponent of `{name}` is not allowed"), word.len()));
         };
         dimension = dimension.multiplied_by(UnitDimension::new(*single).power(exponent));
         n_factors += 1;

@@ -68,9 +68,7 @@ impl SchemaValue for SpannedName {
 pub(crate) fn is_name(text: &str) -> bool {
     text.len() <= 60
         && text.starts_with(|first: char| first.is_ascii_alphabetic())
-        && text
-            .chars()
-            .all(|found| found.is_ascii_alphanumeric() || found == '_')
+        && text.chars().all(|found| found.is_ascii_alphanumeric() || found == '_')
 }
 
 /// Reports a name that is not an identifier; true if it is one.
@@ -136,10 +134,7 @@ impl SchemaValue for SpannedText {
         };
         // Notes are printed on pages and in messages, so their length is limited.
         if text.len() > 4000 {
-            log.push(
-                Diagnostic::error(node.span, "this text is too long")
-                    .label("at most 4000 characters"),
-            );
+            log.push(Diagnostic::error(node.span, "this text is too long").label("at most 4000 characters"));
             return None;
         }
         Some(Self {
@@ -183,10 +178,7 @@ impl SchemaValue for SpannedNumber {
         };
         // TOML has `inf` and `nan`, which no quantity of a mechanism may be.
         match text.parse::<f64>() {
-            Ok(value) if value.is_finite() => Some(Self {
-                value,
-                span: node.span,
-            }),
+            Ok(value) if value.is_finite() => Some(Self { value, span: node.span }),
             _ => {
                 log.push(
                     Diagnostic::error(node.span, format!("`{}` is not finite", quote(text)))
@@ -322,12 +314,9 @@ impl SchemaValue for SchemaVersion {
         // Another version is reported, and reading continues with the rules of this one.
         if text != "1" {
             log.push(
-                Diagnostic::error(
-                    node.span,
-                    format!("file format {} is not known", quote(text)),
-                )
-                .label("expected 1")
-                .help("a newer modelmill may read this file; this one reads `schema = 1`"),
+                Diagnostic::error(node.span, format!("file format {} is not known", quote(text)))
+                    .label("expected 1")
+                    .help("a newer modelmill may read this file; this one reads `schema = 1`"),
             );
         }
         Some(Self)
@@ -385,10 +374,7 @@ impl SchemaValue for FormulaVector {
         }
         // A faulty entry is `None`; its fault is reported by the reader of expressions.
         Some(Self {
-            entries: array
-                .iter()
-                .map(|entry| SourceFormula::read(entry, log))
-                .collect(),
+            entries: array.iter().map(|entry| SourceFormula::read(entry, log)).collect(),
             span: node.span,
         })
     }
@@ -477,19 +463,11 @@ impl SchemaValue for NameSuffix {
 
     fn read(node: &TomlNode, log: &mut DiagnosticLog) -> Option<Self> {
         // Numbers are allowed, because suffixes are often indices.
-        let (TomlValue::Text { text, .. }
-        | TomlValue::Number {
-            text,
-            is_integer: true,
-        }) = &node.value
-        else {
+        let (TomlValue::Text { text, .. } | TomlValue::Number { text, is_integer: true }) = &node.value else {
             return wrong_type::<Self>(node, log);
         };
         // The suffix may start with a digit, unlike a name.
-        let fine = text.len() <= 40
-            && text
-                .chars()
-                .all(|found| found.is_ascii_alphanumeric() || found == '_');
+        let fine = text.len() <= 40 && text.chars().all(|found| found.is_ascii_alphanumeric() || found == '_');
         if !fine {
             log.push(
                 Diagnostic::error(node.span, "this cannot end a name")

@@ -18,37 +18,21 @@ fn main() -> Outcome {
     }
 
     let recordings = root.join("recordings/spidermill-mbs");
-    let fit = model.recording(
-        recordings.join("with-rods-fit.csv"),
-        &RecordingOptions::default(),
-    )?;
-    let check = model.recording(
-        recordings.join("with-rods-check.csv"),
-        &RecordingOptions::default(),
-    )?;
+    let fit = model.recording(recordings.join("with-rods-fit.csv"), &RecordingOptions::default())?;
+    let check = model.recording(recordings.join("with-rods-check.csv"), &RecordingOptions::default())?;
     // Identification of the model as it is, for comparison.
     let before = model.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
-    println!(
-        "identified: error {:.2} % on the validation run",
-        percent(&before)
-    );
+    println!("identified: error {:.2} % on the validation run", percent(&before));
 
     let findings = model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())?;
     for missing in &findings.missing {
-        println!(
-            "missing: {} at {}",
-            missing.effect.kind,
-            missing.effect.at.join(", ")
-        );
+        println!("missing: {} at {}", missing.effect.kind, missing.effect.at.join(", "));
     }
 
     // The completed model is derived again and fitted to the same recordings.
     let better = model.with_added_effects(&findings.entries)?;
     let after = better.identify(&[&fit], &[&check], &EstimatorOptions::default())?;
-    println!(
-        "with the effect: error {:.2e} % on the validation run",
-        percent(&after)
-    );
+    println!("with the effect: error {:.2e} % on the validation run", percent(&after));
 
     let folder = std::env::temp_dir();
     let write = |name: &str, text: &str| {
@@ -58,10 +42,7 @@ fn main() -> Outcome {
         Ok(())
     };
     write("spidermill-completed.toml", better.text())?;
-    write(
-        "what-the-model-lacks.html",
-        &report::page(&findings, &LibrarySpelling)?,
-    )
+    write("what-the-model-lacks.html", &report::page(&findings, &LibrarySpelling)?)
 }
 
 /// The error on the validation run relative to the measured forces, per cent.

@@ -3,7 +3,7 @@
 use modelmill_spec::EffectKind;
 use modelmill_spec::edit::{NewEffect, NewParameter};
 
-use crate::diagnose::added;
+use crate::diagnose::added_effects;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
@@ -32,10 +32,7 @@ impl Model {
     /// Fails when the edited file is invalid: an unknown kind or place, a missing value, or an effect given twice.
     pub fn with_added_effects(&self, effects: &[NewEffect]) -> Outcome<Model> {
         let added = added::add_entries(self, effects)?;
-        Ok(self
-            .host()
-            .derive(&self.path, added.loaded)?
-            .with_values_of(self))
+        Ok(self.host().derive(&self.path, added.loaded)?.with_values_of(self))
     }
 }
 
@@ -56,12 +53,7 @@ impl Model {
 /// assert_eq!(with_friction.base.len(), arm.base.len() + 1);
 /// # Ok::<(), modelmill::Error>(())
 /// ```
-pub fn new_effect(
-    kinds: &[EffectKind],
-    kind: &str,
-    at: &[String],
-    settings: &[EffectSetting],
-) -> Outcome<NewEffect> {
+pub fn new_effect(kinds: &[EffectKind], kind: &str, at: &[String], settings: &[EffectSetting]) -> Outcome<NewEffect> {
     let mut effect = NewEffect {
         kind: kind.to_owned(),
         at: at.iter().map(|name| name.trim().to_owned()).collect(),

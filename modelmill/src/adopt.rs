@@ -68,9 +68,7 @@ impl Model {
             // Base parameters are written by their expressions, which do not depend on their numbers.
             for (k, value) in values.values.iter().enumerate() {
                 if !self.is_known(k) {
-                    adopted
-                        .base
-                        .push((by_expression[k].expression.clone(), *value));
+                    adopted.base.push((by_expression[k].expression.clone(), *value));
                 }
             }
         } else {
@@ -85,8 +83,8 @@ impl Model {
                 adopted.parameters.push((name, value));
             }
         }
-        let text = write_identified(self.text(), &adopted)
-            .map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
+        let text =
+            write_identified(self.text(), &adopted).map_err(|says| Error::input(format!("{}: {says}", self.path)))?;
         // The edited text is read again, so that an invalid edit cannot be returned.
         let loaded = self.host().load_text(self.path.as_ref(), &text)?;
         Ok(FitAdoption {

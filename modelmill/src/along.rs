@@ -6,27 +6,21 @@ use modelmill_spec::DriveKind;
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// The model's forces along a segment for given base parameters, `[drive][sample]`, N or N m, not decimated.
 ///
 /// Fails when a pose has no solution.
 pub fn forces(model: &Model, data: &RecordingSegment, values: &[f64]) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
-    columns(model, data, |states| {
-        evaluator.inverse_dynamics(states, values)
-    })
+    columns(model, data, |states| evaluator.inverse_dynamics(states, values))
 }
 
 /// Determined components of the reactions along a segment for nominal parameters, `[component][sample]`, N or N m,
 /// decimated.
 ///
 /// Fails when a pose has no solution, or the segment is too short to be filtered.
-pub fn reactions(
-    model: &Model,
-    data: &RecordingSegment,
-    reactions: &ReactionPrograms,
-) -> Outcome<Vec<Vec<f64>>> {
+pub fn reactions(model: &Model, data: &RecordingSegment, reactions: &ReactionPrograms) -> Outcome<Vec<Vec<f64>>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let columns = columns(model, data, |states| evaluator.reactions(reactions, states))?;
     filter_and_decimate(columns, data)
@@ -78,8 +72,7 @@ pub fn variables(model: &Model, data: &RecordingSegment) -> Outcome<Vec<(String,
     let evaluator = ModelEvaluator::new(&model.derivation);
     let passive = model.passive_coordinates();
     if !passive.is_empty() {
-        let mut columns =
-            columns(model, data, |states| evaluator.passive_motion(states))?.into_iter();
+        let mut columns = columns(model, data, |states| evaluator.passive_motion(states))?.into_iter();
         variables.extend(passive.iter().cloned().zip(columns.by_ref()));
         variables.extend(passive.iter().map(|name| format!("{name}_d")).zip(columns));
     }
@@ -124,10 +117,9 @@ pub fn columns(
     mut evaluate: impl FnMut(&MotionStates<'_>) -> Result<Vec<Vec<f64>>, PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut columns: Vec<Vec<f64>> = Vec::new();
-    model.host().run_job(
-        &format!("evaluating {}", data.run.file),
-        data.samples(),
-        |job| {
+    model
+        .host()
+        .run_job(&format!("evaluating {}", data.run.file), data.samples(), |job| {
             data.for_each_block(model, |states| {
                 job.step(states.len())?;
                 Ok::<_, Error>(evaluate(states).and_then(check_finite).map(|block| {
@@ -140,8 +132,7 @@ pub fn columns(
                     }
                 }))
             })
-        },
-    )??;
+        })??;
     Ok(columns)
 }
 
@@ -162,10 +153,7 @@ fn check_finite(block: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseFault> {
 /// Low-pass filters and decimates every column by the factor of the recording; a column of zeros stays zero.
 ///
 /// Fails when a column is too short for the filter.
-pub fn filter_and_decimate(
-    columns: Vec<Vec<f64>>,
-    data: &RecordingSegment,
-) -> Outcome<Vec<Vec<f64>>> {
+pub fn filter_and_decimate(columns: Vec<Vec<f64>>, data: &RecordingSegment) -> Outcome<Vec<Vec<f64>>> {
     let factor = data.decimation();
     if factor == 1 {
         return Ok(columns);

@@ -66,10 +66,7 @@ impl Model {
             self.derive_variant(bodies)?
         };
         let base = [&general, &self.derive_variant(weightless)?].map(|m| m.base.len());
-        let at_values = general
-            .check()?
-            .rank
-            .map_or(0, |rank| rank.numeric_rank.rank);
+        let at_values = general.check()?.rank.map_or(0, |rank| rank.numeric_rank.rank);
         let of = |motion: CoordinateMotion| {
             let coordinates = mechanism.coordinates.iter();
             coordinates.filter(|c| c.motion == motion).count()
@@ -87,17 +84,14 @@ impl Model {
             free,
             passive: mechanism.coordinates.iter().filter(|c| c.passive).count(),
             loops: mechanism.loops.len(),
-            drives: mechanism.drives.iter().filter(|d| d.is_driven).count()
-                + mechanism.shared_drives.len(),
+            drives: mechanism.drives.iter().filter(|d| d.is_driven).count() + mechanism.shared_drives.len(),
             base,
             at_values,
             is_exact: matches!(derivation.reduction.method, ReductionMethod::Exact { .. }),
             effects: [mechanism.effects.len(), derivation.reduction.retained.len()],
             operations: [
                 programs.regressor.count_operations(ProgramStage::State),
-                programs
-                    .inverse_dynamics
-                    .count_operations(ProgramStage::State),
+                programs.inverse_dynamics.count_operations(ProgramStage::State),
             ],
             seconds,
             is_imported: false,
@@ -194,8 +188,7 @@ impl AtlasEntry {
             self.at_values,
             operations(regressor),
             operations(dynamics),
-            self.seconds
-                .map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
+            self.seconds.map_or_else(|| "-".to_owned(), |s| significant(s, 2)),
         )
         // Pictures and pages are in a folder next to the table.
         .replace("](", "](atlas/")

@@ -1,15 +1,15 @@
 //! `compare`: errors of a model along recordings, and the regions in which they occur.
 
 use modelmill_identify::{
-    BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions,
-    RecordingNote, TIME_COLUMN, add_filtered_forces, locate_errors,
+    BandError, ErrorAccumulator, ErrorFigures, ErrorRegion, FilteredFigures, LocateOptions, RecordingNote, TIME_COLUMN,
+    add_filtered_forces, locate_errors,
 };
 
 use crate::along::{self, interleave, variables};
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Errors of a model along recordings.
 pub struct ModelComparison {
@@ -29,11 +29,7 @@ impl Model {
     /// Compares the model with recordings; `values` are those of its base parameters, in its order and in their units.
     ///
     /// Fails when a recording lacks the force of a drive, or contains a pose that the mechanism cannot reach.
-    pub fn compare(
-        &self,
-        recordings: &[&PreparedRecording],
-        values: &[f64],
-    ) -> Outcome<ModelComparison> {
+    pub fn compare(&self, recordings: &[&PreparedRecording], values: &[f64]) -> Outcome<ModelComparison> {
         // Forces are computed once, for the figures and for the regions.
         let [data, _] = recording::segments(self, recordings, &[]);
         let forces = data
@@ -78,11 +74,9 @@ pub fn figures(
     let mut raw = comparison(model);
     for (one, forces) in data.iter().zip(forces) {
         let measured = one.run.measured_forces()?;
-        raw.add_counted(
-            &interleave(measured),
-            &interleave(forces),
-            |sample, drive| one.run.is_force_measured(drive, sample),
-        )?;
+        raw.add_counted(&interleave(measured), &interleave(forces), |sample, drive| {
+            one.run.is_force_measured(drive, sample)
+        })?;
     }
     let mut figures = raw.finish()?;
     // Figures in the band use both forces after the same low-pass.
@@ -186,11 +180,7 @@ pub fn error_locations(
         } else {
             for (d, drive) in &drives {
                 let error = errors_of(k, *d);
-                let mut found = locate_errors(
-                    &[(drive, &error)],
-                    &[(TIME_COLUMN, &time)],
-                    &LocateOptions::default(),
-                );
+                let mut found = locate_errors(&[(drive, &error)], &[(TIME_COLUMN, &time)], &LocateOptions::default());
                 for region in &mut found {
                     region.says = format!("{}: {}", one.run.file, region.says);
                 }

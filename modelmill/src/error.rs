@@ -5,9 +5,7 @@ use std::fmt;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{LibrarySpelling, Message, RemedySpelling};
 use modelmill_codegen::DeriveError;
-use modelmill_identify::{
-    FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError,
-};
+use modelmill_identify::{FiguresError, FilterError, FitFileError, LeastSquaresError, RecordingError};
 
 /// Result of a method of the library.
 pub type Outcome<T = ()> = Result<T, Error>;

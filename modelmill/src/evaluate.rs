@@ -33,12 +33,9 @@ impl Model {
         values: &[f64],
     ) -> Outcome<RecordingEvaluation> {
         let mut found = RecordingEvaluation::new(self.drives(), Vec::new());
-        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
-            let forces = along::forces(self, stretch, values)?;
-            found.extend(
-                &stretch.time(),
-                along::filter_and_decimate(forces, stretch)?,
-            );
+        for segment in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            let forces = along::forces(self, segment, values)?;
+            found.extend(&segment.time(), along::filter_and_decimate(forces, segment)?);
         }
         Ok(found)
     }
@@ -56,11 +53,8 @@ impl Model {
         let reactions = derived.map_err(|error| Error::derivation(&self.path, error))?;
         let components = reaction_components(&reactions);
         let mut found = RecordingEvaluation::new(components.determined, components.left_out);
-        for stretch in &recording::read_as_recorded(self, path.as_ref(), reading)? {
-            found.extend(
-                &stretch.time(),
-                along::reactions(self, stretch, &reactions)?,
-            );
+        for segment in &recording::read_as_recorded(self, path.as_ref(), reading)? {
+            found.extend(&segment.time(), along::reactions(self, segment, &reactions)?);
         }
         Ok(found)
     }

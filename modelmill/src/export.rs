@@ -27,11 +27,7 @@ pub fn description(path: &str, loaded: &LoadedModel, format: Format) -> Outcome<
         .map_err(|error| Error::input(format!("{path}: {error}")))?;
     Ok(ExportedRobot {
         text: exported.text,
-        notes: exported
-            .remarks
-            .into_iter()
-            .map(RecordingNote::warning)
-            .collect(),
+        notes: exported.remarks.into_iter().map(RecordingNote::warning).collect(),
     })
 }
 

@@ -105,19 +105,13 @@ impl Model {
     /// ```
     pub fn generate(&self, code: &CodeOptions) -> Outcome<Vec<EmittedFile>> {
         // Not all languages can express reactions and the self-test; the error names those that can.
-        let more = [
-            ("reactions", code.reactions),
-            ("a self-test", code.self_test),
-        ];
+        let more = [("reactions", code.reactions), ("a self-test", code.self_test)];
         if let Some((what, _)) = more.iter().find(|(_, asked)| *asked)
             && !code.language.has_all()
         {
             let able = CodeLanguage::all().filter(|language| language.has_all());
             let able: Vec<&str> = able.map(CodeLanguage::name).collect();
-            return Err(Error::options(format!(
-                "only {} can have {what}",
-                able.join(" and ")
-            )));
+            return Err(Error::options(format!("only {} can have {what}", able.join(" and "))));
         }
         let what = format!("writing the code of {}", self.name);
         self.host().run_job(&what, 0, |_| self.emit_files(*code))?

@@ -48,13 +48,9 @@ impl Host {
         };
         let text = modelmill_reduction::expand_includes(text, &read)
             .map_err(|fault| Error::input(format!("{name}: {fault}")))?;
-        let imported = modelmill_reduction::import(&text, options)
-            .map_err(|error| Error::input(format!("{name}: {error}")))?;
-        let notes: Vec<RecordingNote> = imported
-            .remarks
-            .into_iter()
-            .map(RecordingNote::warning)
-            .collect();
+        let imported =
+            modelmill_reduction::import(&text, options).map_err(|error| Error::input(format!("{name}: {error}")))?;
+        let notes: Vec<RecordingNote> = imported.remarks.into_iter().map(RecordingNote::warning).collect();
         for note in &notes {
             self.note(note);
         }

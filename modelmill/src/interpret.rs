@@ -4,8 +4,7 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::interpret::{
-    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, Polynomial, exact_decimal,
-    interpret,
+    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, Polynomial, exact_decimal, interpret,
 };
 use modelmill_identify::{FitFile, NullDirection, ParameterStatus, RecordingNote};
 use modelmill_spec::Sign;
@@ -34,21 +33,14 @@ impl Model {
     ///
     /// Fails when a name is not a parameter of the model, when the fit belongs to another model, or when the
     /// equations are too many for an exact solution.
-    pub fn interpret(
-        &self,
-        fit: &FitFile,
-        file: &str,
-        unknown: &[String],
-    ) -> Outcome<InterpretationResult> {
+    pub fn interpret(&self, fit: &FitFile, file: &str, unknown: &[String]) -> Outcome<InterpretationResult> {
         // The equations contain only base parameters in which an unknown occurs.
         let unknown = self::unknown_indices(self, unknown)?;
         let values = self.values_of(fit, file)?;
         let (system, used) = system(self, &unknown, &values.values, fit);
         let found = self
             .host()
-            .run_job("solving for the unknown parameters", 0, |_| {
-                interpret(&system)
-            })?
+            .run_job("solving for the unknown parameters", 0, |_| interpret(&system))?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
         let mut interpreted = InterpretationResult {
             model: self.clone(),
@@ -57,10 +49,7 @@ impl Model {
             found,
             notes: values.notes,
         };
-        let remarks = interpreted
-            .remarks(fit)
-            .into_iter()
-            .map(RecordingNote::warning);
+        let remarks = interpreted.remarks(fit).into_iter().map(RecordingNote::warning);
         interpreted.notes.extend(remarks);
         // The listener receives the notes as soon as they are known.
         for note in &interpreted.notes {
@@ -100,25 +89,12 @@ pub fn unknown_indices(model: &Model, names: &[String]) -> Outcome<Vec<usize>> {
 
 /// The polynomial equations in the unknowns alone, and the indices of the base parameters that contain an unknown.
 /// `values` are the identified base parameters, in the order of the model.
-pub fn system(
-    model: &Model,
-    unknown: &[usize],
-    values: &[f64],
-    fit: &FitFile,
-) -> (InterpretationProblem, Vec<usize>) {
+pub fn system(model: &Model, unknown: &[usize], values: &[f64], fit: &FitFile) -> (InterpretationProblem, Vec<usize>) {
     let mechanism = &model.derivation.mechanism;
     // Constants and nominal values enter as exact decimals, so that the solver works in exact
     // arithmetic.
-    let constants: Vec<_> = mechanism
-        .constants
-        .iter()
-        .map(|c| exact_decimal(c.value))
-        .collect();
-    let nominal: Vec<_> = mechanism
-        .parameters
-        .iter()
-        .map(|p| exact_decimal(p.nominal))
-        .collect();
+    let constants: Vec<_> = mechanism.constants.iter().map(|c| exact_decimal(c.value)).collect();
+    let nominal: Vec<_> = mechanism.parameters.iter().map(|p| exact_decimal(p.nominal)).collect();
     let mut equations = Vec::new();
     for terms in model.derivation.base_polynomials(&constants) {
         let mut equation = Polynomial::new(unknown.len());
@@ -155,10 +131,7 @@ pub fn system(
         equations: used.iter().map(|k| equations[*k].clone()).collect(),
         values: used.iter().map(|k| values[*k]).collect(),
         covariance: fit.covariance_of(&at).map(|(covariance, _)| covariance),
-        nominal: unknown
-            .iter()
-            .map(|u| mechanism.parameters[*u].nominal)
-            .collect(),
+        nominal: unknown.iter().map(|u| mechanism.parameters[*u].nominal).collect(),
     };
     (system, used)
 }
@@ -174,8 +147,9 @@ impl InterpretationResult {
     /// All real solutions; none where something is not determined.
     pub fn solutions(&self) -> &[PhysicalSolution] {
         match &self.found {
-            PhysicalInterpretation::Exact { solutions }
-            | PhysicalInterpretation::LeastSquares { solutions, .. } => solutions,
+            PhysicalInterpretation::Exact { solutions } | PhysicalInterpretation::LeastSquares { solutions, .. } => {
+                solutions
+            }
             PhysicalInterpretation::Undetermined { .. } => &[],
         }
     }
@@ -196,10 +170,9 @@ impl InterpretationResult {
             .map(|direction| match direction.changes.as_slice() {
                 // A single parameter without effect gets a shorter phrase than a combination.
                 [(i, _)] => format!("{} has no effect on the base parameters", names[*i]),
-                _ => direction.describe(&names).replace(
-                    "changes nothing",
-                    "changes no base parameter (near the nominal values)",
-                ),
+                _ => direction
+                    .describe(&names)
+                    .replace("changes nothing", "changes no base parameter (near the nominal values)"),
             })
             .collect()
     }
@@ -241,9 +214,7 @@ impl InterpretationResult {
         // covariance.
         if !self.solutions().is_empty() {
             if used.iter().any(|p| p.std.is_none()) {
-                says.push(
-                    "the fit gives no standard deviations, so the solutions have none".to_owned(),
-                );
+                says.push("the fit gives no standard deviations, so the solutions have none".to_owned());
             } else if fit.covariance.is_none() && used.len() > 1 {
                 says.push(
                     "the fit gives no covariance: the base parameters are taken as independent, which may make the \
@@ -254,8 +225,7 @@ impl InterpretationResult {
         }
         // With more equations than unknowns, chi^2 tests whether the fixed nominal values are
         // consistent.
-        if let (PhysicalInterpretation::LeastSquares { .. }, Some(best)) =
-            (&self.found, self.solutions().first())
+        if let (PhysicalInterpretation::LeastSquares { .. }, Some(best)) = (&self.found, self.solutions().first())
             && let Some(chi_squared) = best.chi_squared
         {
             let freedom = self.used.len() - self.unknown.len();

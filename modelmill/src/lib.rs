@@ -162,7 +162,7 @@
 //! # Modules
 //!
 //! In the order of the data flow, each based on those before it: [`text`], [`error`], [`progress`], [`host`],
-//! [`model`], [`stretch`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`],
+//! [`model`], [`segment`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`],
 //! [`diagnose`], [`add`], [`adopt`], [`runs`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`],
 //! [`reduce`], [`mod@import`], [`mod@export`], [`picture`], [`atlas`], [`mod@print`], [`report`].
 
@@ -194,10 +194,10 @@ pub mod reduce;
 mod regressors;
 pub mod report;
 pub mod runs;
+pub mod segment;
 #[cfg(feature = "rig")]
 pub mod simulate;
 pub mod states;
-pub mod stretch;
 pub mod text;
 pub mod variants;
 

@@ -48,8 +48,7 @@ impl Model {
         // Passive coordinates are solved for by loop closure at the requested pose, with zero rates.
         let places = |passive: bool| {
             let all = mechanism.coordinates.iter().enumerate();
-            all.filter(move |(_, c)| c.passive == passive)
-                .map(|(i, _)| i)
+            all.filter(move |(_, c)| c.passive == passive).map(|(i, _)| i)
         };
         let active: Vec<f64> = places(false).map(|i| pose[i]).collect();
         let zero = [0.0];
@@ -62,12 +61,8 @@ impl Model {
         };
         if places(true).next().is_some() {
             let passive = ModelEvaluator::new(&self.derivation).passive_motion(&states);
-            let passive = passive.map_err(|_| {
-                Error::options(format!(
-                    "the loops of {} cannot close at that pose",
-                    self.name
-                ))
-            })?;
+            let passive =
+                passive.map_err(|_| Error::options(format!("the loops of {} cannot close at that pose", self.name)))?;
             for (i, column) in places(true).zip(passive) {
                 pose[i] = column[0];
             }

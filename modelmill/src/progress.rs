@@ -145,15 +145,9 @@ mod tests {
             stops: "long",
             ..Listener::default()
         };
-        assert!(matches!(
-            run_job(&listener, "short", 2, JobHandle::done),
-            Ok(0)
-        ));
+        assert!(matches!(run_job(&listener, "short", 2, JobHandle::done), Ok(0)));
         let found = run_job(&listener, "long", 0, |_| unreachable!("it was cancelled"));
         assert!(matches!(found, Err::<(), _>(Error::Cancelled)));
-        assert_eq!(
-            *listener.heard.lock().unwrap(),
-            ["short 2", "end", "long 0", "end"]
-        );
+        assert_eq!(*listener.heard.lock().unwrap(), ["short 2", "end", "long 0", "end"]);
     }
 }

@@ -55,9 +55,7 @@ impl Host {
                     Remedy::option(OptionName::Plan)
                 )),
             })?;
-        let forces = self.run_job("comparing the model with the rig", 0, |_| {
-            compare(rig, &reduction)
-        })??;
+        let forces = self.run_job("comparing the model with the rig", 0, |_| compare(rig, &reduction))??;
         Ok(RigReduction {
             rig: rig.name.clone(),
             reduction,
@@ -81,27 +79,15 @@ pub struct DriveForceError {
 ///
 /// Fails when the reduced model cannot be loaded or derived, or when the rig cannot be sampled.
 fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceError>> {
-    let loaded = modelmill_spec::load(
-        "the reduced model",
-        &reduction.model,
-        &MemoryFiles::default(),
-    )?;
-    let derivation = modelmill_codegen::derive(&loaded.mechanism)
-        .map_err(|error| Error::derivation("the reduced model", error))?;
+    let loaded = modelmill_spec::load("the reduced model", &reduction.model, &MemoryFiles::default())?;
+    let derivation =
+        modelmill_codegen::derive(&loaded.mechanism).map_err(|error| Error::derivation("the reduced model", error))?;
     let mechanism = &derivation.mechanism;
-    let sampled =
-        sampled_forces(rig, POSES.0, POSES.1).map_err(|error| Error::input(error.to_string()))?;
+    let sampled = sampled_forces(rig, POSES.0, POSES.1).map_err(|error| Error::input(error.to_string()))?;
     // Coordinates and drives are matched by name, since their order in the model may differ.
-    let active = mechanism
-        .coordinates
-        .iter()
-        .filter(|coordinate| !coordinate.passive);
+    let active = mechanism.coordinates.iter().filter(|coordinate| !coordinate.passive);
     let order: Vec<usize> = active
-        .filter_map(|c| {
-            rig.coordinates
-                .iter()
-                .position(|known| known.name == c.name)
-        })
+        .filter_map(|c| rig.coordinates.iter().position(|known| known.name == c.name))
         .collect();
     let column = |of: fn(&RigState) -> &Vec<f64>| -> Vec<Vec<f64>> {
         order
@@ -125,11 +111,7 @@ fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceErro
     };
     let model = ModelEvaluator::new(&derivation)
         .inverse_dynamics(&states, &derivation.nominal_base_values())
-        .map_err(|fault| {
-            Error::input(format!(
-                "the reduced model does not follow the rig: {fault}"
-            ))
-        })?;
+        .map_err(|fault| Error::input(format!("the reduced model does not follow the rig: {fault}")))?;
     let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|x| x * x).sum::<f64>().sqrt();
     Ok(mechanism
         .drives
@@ -137,8 +119,7 @@ fn compare(rig: &Rig, reduction: &PlanarReduction) -> Outcome<Vec<DriveForceErro
         .zip(model.iter().zip(&truth))
         .map(|(drive, (model, truth))| DriveForceError {
             drive: drive.name.clone(),
-            nrms: norm(&mut model.iter().zip(truth).map(|(x, y)| x - y))
-                / norm(&mut truth.iter().copied()),
+            nrms: norm(&mut model.iter().zip(truth).map(|(x, y)| x - y)) / norm(&mut truth.iter().copied()),
         })
         .collect())
 }

@@ -6,7 +6,7 @@ use modelmill_identify::diagnose::ForceColumn;
 use crate::along::filter_and_decimate;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Segments, each with whether it belongs to the validation runs.
 pub(crate) type SegmentList<'a> = [(&'a RecordingSegment, bool)];
@@ -86,30 +86,28 @@ fn nonzero_columns(
     // Columns that are not wanted are neither stored nor tested.
     let mut is_wanted: Vec<bool> = Vec::new();
     one.for_each_block(model, |states| {
-        Ok::<_, Error>(
-            evaluator.regressor_column_blocks(states, wanted, |samples, block| {
-                if columns.is_empty() {
-                    let n = block.len() / n_drives;
-                    columns.resize(block.len(), None);
-                    is_wanted = (0..block.len()).map(|k| wanted(k % n)).collect();
+        Ok::<_, Error>(evaluator.regressor_column_blocks(states, wanted, |samples, block| {
+            if columns.is_empty() {
+                let n = block.len() / n_drives;
+                columns.resize(block.len(), None);
+                is_wanted = (0..block.len()).map(|k| wanted(k % n)).collect();
+            }
+            let columns = columns.iter_mut().zip(block).zip(&is_wanted);
+            for ((column, values), _) in columns.filter(|(_, is_wanted)| **is_wanted) {
+                // A column gets memory only at its first value that is not zero.
+                if column.is_none() && values.iter().all(|x| *x == 0.0) {
+                    continue;
                 }
-                let columns = columns.iter_mut().zip(block).zip(&is_wanted);
-                for ((column, values), _) in columns.filter(|(_, is_wanted)| **is_wanted) {
-                    // A column gets memory only at its first value that is not zero.
-                    if column.is_none() && values.iter().all(|x| *x == 0.0) {
-                        continue;
-                    }
-                    let column = column.get_or_insert_with(|| {
-                        let mut zeros = Vec::with_capacity(one.samples());
-                        zeros.resize(before, 0.0);
-                        zeros
-                    });
-                    column.extend_from_slice(values);
-                }
-                before += samples;
-                Ok(())
-            }),
-        )
+                let column = column.get_or_insert_with(|| {
+                    let mut zeros = Vec::with_capacity(one.samples());
+                    zeros.resize(before, 0.0);
+                    zeros
+                });
+                column.extend_from_slice(values);
+            }
+            before += samples;
+            Ok(())
+        }))
     })?;
     Ok(columns)
 }

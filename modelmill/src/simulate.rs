@@ -6,9 +6,7 @@ use modelmill_boundary::files::PathKind;
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Remedy};
 use modelmill_identify::{ReadOptions, RecordingFile, SignalRecording};
-use modelmill_rig::{
-    CoordinateSamples, Rig, RigRecording, SimulationError, Trajectory, TrajectoryError,
-};
+use modelmill_rig::{CoordinateSamples, Rig, RigRecording, SimulationError, Trajectory, TrajectoryError};
 
 use crate::error::{Error, Outcome};
 use crate::host::Host;
@@ -117,11 +115,7 @@ impl Host {
 /// recorded.
 ///
 /// Fails when a column is missing or times do not increase; the message has the line of the file.
-fn trajectory(
-    rig: &Rig,
-    recording: &SignalRecording,
-    notes: &mut Vec<String>,
-) -> Outcome<Trajectory> {
+fn trajectory(rig: &Rig, recording: &SignalRecording, notes: &mut Vec<String>) -> Outcome<Trajectory> {
     let given = |name: String| -> Outcome<Option<Vec<f64>>> {
         if recording.has_column(&name) {
             Ok(Some(recording.column(&name)?.to_vec()))
@@ -163,10 +157,7 @@ fn trajectory(
                 )
             }
             TrajectoryError::Faulty { coordinate } => {
-                format!(
-                    "{file}, column `{}`: {error}",
-                    names.get(*coordinate).unwrap_or(&"")
-                )
+                format!("{file}, column `{}`: {error}", names.get(*coordinate).unwrap_or(&""))
             }
             TrajectoryError::Empty | TrajectoryError::TooShort => format!("{file}: {error}"),
         })
@@ -183,9 +174,7 @@ fn refusal(
 ) -> Error {
     let (SimulationError::Pose { time, .. }
     | SimulationError::NotFinite {
-        time,
-        largest: None,
-        ..
+        time, largest: None, ..
     }) = error
     else {
         return Error::input(format!("{}: {error}", path.display()));

@@ -4,9 +4,7 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use modelmill_codegen::{
-    DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms,
-};
+use modelmill_codegen::{DynamicsPrograms, ModelEvaluator, MotionStates, PoseFault, PoseReason, ReactionPrograms};
 use modelmill_emit::vectors_c;
 use rayon::prelude::*;
 
@@ -138,10 +136,7 @@ impl ModelFunctions {
     ///
     /// Fails when the function cannot be derived.
     pub fn shape(&self, function: ModelFunction) -> Outcome<[usize; 2]> {
-        let (active, drives) = (
-            self.model.active_coordinates().len(),
-            self.model.drives().len(),
-        );
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
         Ok(match function {
             ModelFunction::InverseDynamics => [drives, 1],
             ModelFunction::Regressor => [drives, self.model.base.len()],
@@ -170,12 +165,7 @@ impl ModelFunctions {
     /// assert!(forces.len() == 2 && forces[0] > forces[1]);
     /// # Ok::<(), modelmill::Error>(())
     /// ```
-    pub fn evaluate_at(
-        &self,
-        function: ModelFunction,
-        given: &StateSamples<'_>,
-        values: &[f64],
-    ) -> Outcome<Vec<f64>> {
+    pub fn evaluate_at(&self, function: ModelFunction, given: &StateSamples<'_>, values: &[f64]) -> Outcome<Vec<f64>> {
         let parts = self.checked_inputs(function, given)?;
         if values.len() != self.model.base.len() {
             return Err(Error::input(format!(
@@ -264,10 +254,7 @@ impl ModelFunctions {
         function: ModelFunction,
         given: &StateSamples<'a>,
     ) -> Outcome<[Option<StateMatrix<'a>>; 4]> {
-        let (active, drives) = (
-            self.model.active_coordinates().len(),
-            self.model.drives().len(),
-        );
+        let (active, drives) = (self.model.active_coordinates().len(), self.model.drives().len());
         // Effects that depend on the load need forces of the drives for every function.
         let [rates, accelerations, forces] = function.required_inputs();
         let by_load = self.model.load_dependent_effects();
@@ -345,8 +332,7 @@ impl ModelFunctions {
             return Ok(known);
         }
         let what = "deriving the reactions";
-        let derived =
-            (self.model.host()).run_job(what, 0, |_| self.model.derivation.reactions())?;
+        let derived = (self.model.host()).run_job(what, 0, |_| self.model.derivation.reactions())?;
         let derived = derived.map_err(|error| Error::derivation(&self.model.path, error))?;
         Ok(self.reactions.get_or_init(|| derived))
     }
@@ -379,9 +365,7 @@ fn fill(
     let (dynamics, reactions) = (prepared.dynamics, prepared.reactions);
     let found = match (function, dynamics, reactions) {
         (ModelFunction::InverseDynamics, ..) => evaluator.inverse_dynamics(&given, values)?,
-        (ModelFunction::MassMatrix, Some(dynamics), _) => {
-            evaluator.mass_matrix(dynamics, &given, values)?
-        }
+        (ModelFunction::MassMatrix, Some(dynamics), _) => evaluator.mass_matrix(dynamics, &given, values)?,
         (ModelFunction::Bias, Some(dynamics), _) => evaluator.bias(dynamics, &given, values)?,
         (ModelFunction::ForwardDynamics, Some(dynamics), _) => {
             evaluator.forward_dynamics(dynamics, &given, values, &forces)?
@@ -391,11 +375,7 @@ fn fill(
         (ModelFunction::Regressor, ..) => {
             let mut start = 0;
             return evaluator.regressor_blocks(&given, |len, columns| {
-                scatter(
-                    columns,
-                    &mut out[start * width..(start + len) * width],
-                    start,
-                )?;
+                scatter(columns, &mut out[start * width..(start + len) * width], start)?;
                 start += len;
                 Ok(())
             });

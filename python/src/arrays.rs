@@ -8,10 +8,7 @@ use pyo3::prelude::*;
 use crate::errors::input_error;
 
 /// The numbers of an array of shape (states, columns), in C or Fortran order.
-pub(crate) fn state_matrix<'a>(
-    py: Python<'_>,
-    array: &'a PyReadonlyArray2<'_, f64>,
-) -> PyResult<StateMatrix<'a>> {
+pub(crate) fn state_matrix<'a>(py: Python<'_>, array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<StateMatrix<'a>> {
     let by_state = array.is_c_contiguous();
     let width = array.shape()[1];
     match array.as_slice() {

@@ -54,10 +54,7 @@ pub(crate) fn fleet_plan(
 
 /// Adds summaries; `None` without any.
 #[pyfunction]
-pub(crate) fn fleet_merge(
-    py: Python<'_>,
-    summaries: Vec<Vec<u8>>,
-) -> PyResult<Option<Bound<'_, PyBytes>>> {
+pub(crate) fn fleet_merge(py: Python<'_>, summaries: Vec<Vec<u8>>) -> PyResult<Option<Bound<'_, PyBytes>>> {
     let merged = py.detach(|| {
         let mut sum: Option<FleetSummary> = None;
         for bytes in &summaries {
@@ -78,8 +75,7 @@ impl FleetGround {
     /// Derives the model of a plan, which is given as JSON.
     #[new]
     fn new(py: Python<'_>, plan: &str) -> PyResult<Self> {
-        let made =
-            py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.derive_model()));
+        let made = py.detach(|| FleetPlan::parse("the plan", plan).and_then(|plan| plan.derive_model()));
         let ground = made.map_err(|fault| fleet_error(py, &fault))?;
         Ok(Self { ground })
     }
@@ -107,12 +103,7 @@ impl FleetGround {
     }
 
     /// The summary of a recording from a file, as bytes.
-    fn summarise_file<'py>(
-        &self,
-        py: Python<'py>,
-        recording: &str,
-        path: PathBuf,
-    ) -> Bound<'py, PyBytes> {
+    fn summarise_file<'py>(&self, py: Python<'py>, recording: &str, path: PathBuf) -> Bound<'py, PyBytes> {
         let bytes = py.detach(|| self.ground.summarise_file(recording, &path).bytes());
         PyBytes::new(py, &bytes)
     }

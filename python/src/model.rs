@@ -23,9 +23,7 @@ use pyo3::prelude::*;
 use crate::arrays::state_matrix;
 use crate::errors::input_error;
 use crate::options::{self, EstimationOptions, ExcitationOptions, OptionResult, ReadingOptions};
-use crate::results::{
-    PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks,
-};
+use crate::results::{PythonExcitation, PythonRecording, PythonResult, PythonSource, RemarkList, remarks};
 use crate::spelling::PythonSpelling;
 use crate::work::{JobListener, run_blocking, run_interruptible};
 
@@ -99,13 +97,7 @@ pub(crate) fn import_text(
     // Text of a file of limited size.
     let read = |path: &Path| {
         let read = host.files().read_text(path, LARGEST_DESCRIPTION);
-        read.map_err(|error| {
-            Error::input(format!(
-                "{} cannot be read: {}",
-                path.display(),
-                error.fault
-            ))
-        })
+        read.map_err(|error| Error::input(format!("{} cannot be read: {}", path.display(), error.fault)))
     };
     let imported = run_interruptible(py, &listener, None, || {
         let (text, path) = match text {
@@ -289,8 +281,7 @@ impl CoreModel {
             "html" => Some(PageFormat::Html),
             "json" => None,
             other => {
-                let says =
-                    format!("format={other:?}: expected text, markdown, latex, html or json");
+                let says = format!("format={other:?}: expected text, markdown, latex, html or json");
                 return Err(input_error(py, &says));
             }
         };
@@ -313,12 +304,7 @@ impl CoreModel {
     }
 
     /// The picture of the mechanism as SVG, at given coordinates and from a direction.
-    fn picture(
-        &self,
-        py: Python<'_>,
-        at: Vec<(String, f64)>,
-        view: Option<[f64; 2]>,
-    ) -> PyResult<String> {
+    fn picture(&self, py: Python<'_>, at: Vec<(String, f64)>, view: Option<[f64; 2]>) -> PyResult<String> {
         let drawing = PictureOptions {
             at,
             from: view,
@@ -348,18 +334,9 @@ impl CoreModel {
         let function = function_by_name(py, function)?;
         let given = StateSamples {
             q: state_matrix(py, &q)?,
-            qd: qd
-                .as_ref()
-                .map(|array| state_matrix(py, array))
-                .transpose()?,
-            qdd: qdd
-                .as_ref()
-                .map(|array| state_matrix(py, array))
-                .transpose()?,
-            forces: forces
-                .as_ref()
-                .map(|array| state_matrix(py, array))
-                .transpose()?,
+            qd: qd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            qdd: qdd.as_ref().map(|array| state_matrix(py, array)).transpose()?,
+            forces: forces.as_ref().map(|array| state_matrix(py, array)).transpose()?,
         };
         // A thread costs more time than a few states.
         let few = given.q.numbers.len() <= FEW * given.q.width;
@@ -380,10 +357,7 @@ impl CoreModel {
     fn vectors_c(&self, py: Python<'_>, function: &str) -> PyResult<(String, [usize; 2])> {
         let function = function_by_name(py, function)?;
         self.run_interruptible(py, None, || {
-            Ok((
-                self.functions.vectors_c(function)?,
-                self.functions.shape(function)?,
-            ))
+            Ok((self.functions.vectors_c(function)?, self.functions.shape(function)?))
         })
     }
 
@@ -460,9 +434,7 @@ impl CoreModel {
                 None => Instruments::Recordings(&recorded),
             };
             let (data, check) = (borrow_recordings(&data), borrow_recordings(&check));
-            let found = self
-                .model
-                .identify_with(&data, &instruments, &check, &estimation)?;
+            let found = self.model.identify_with(&data, &instruments, &check, &estimation)?;
             let text = found.text(&self.model, TerminalStyle::PLAIN, &PythonSpelling);
             let json = found.json(&self.model, &PythonSpelling)?;
             let told = PythonResult::new(&json, &text, remarks(&found.notes));
@@ -489,11 +461,9 @@ impl CoreModel {
             ..DiagnosisOptions::default()
         };
         self.run_interruptible(py, progress.as_ref(), || {
-            let found = self.model.diagnose(
-                &borrow_recordings(&data),
-                &borrow_recordings(&check),
-                &question,
-            )?;
+            let found = self
+                .model
+                .diagnose(&borrow_recordings(&data), &borrow_recordings(&check), &question)?;
             let spelling = PythonSpelling;
             let text = found.text(TerminalStyle::PLAIN, &spelling).join("\n");
             // The model with the effects that were found.
@@ -501,11 +471,9 @@ impl CoreModel {
                 [] => None,
                 entries => Some(self.with_same_host(self.model.with_added_effects(entries)?)),
             };
-            Ok(
-                PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
-                    .with_page(page(&found, &spelling)?)
-                    .with_model(better),
-            )
+            Ok(PythonResult::new(&found.json(&spelling), &text, remarks(&found.notes))
+                .with_page(page(&found, &spelling)?)
+                .with_model(better))
         })
     }
 
@@ -520,8 +488,7 @@ impl CoreModel {
         progress: Option<Bound<'_, PyAny>>,
     ) -> PyResult<PythonResult> {
         let what = valid_options(py, options::runs_options(&per_run, &loads))?;
-        let mut all: Vec<Result<Arc<PreparedRecording>, UnreadRun>> =
-            recordings(&data).into_iter().map(Ok).collect();
+        let mut all: Vec<Result<Arc<PreparedRecording>, UnreadRun>> = recordings(&data).into_iter().map(Ok).collect();
         // Runs that could not be read keep their places in the sequence.
         for (place, file, says) in unread {
             let error = Error::input(says);
@@ -600,23 +567,11 @@ impl CoreModel {
     }
 
     /// Physical parameters from a fit, which is a text with a name or the path of a file.
-    fn interpret(
-        &self,
-        py: Python<'_>,
-        fit: Option<&str>,
-        name: &str,
-        unknown: Vec<String>,
-    ) -> PyResult<PythonResult> {
+    fn interpret(&self, py: Python<'_>, fit: Option<&str>, name: &str, unknown: Vec<String>) -> PyResult<PythonResult> {
         self.run_interruptible(py, None, || {
-            let found = self
-                .model
-                .interpret(&self.fit(fit, name)?, name, &unknown)?;
+            let found = self.model.interpret(&self.fit(fit, name)?, name, &unknown)?;
             let text = found.text(TerminalStyle::PLAIN, &PythonSpelling);
-            Ok(PythonResult::new(
-                &found.json(),
-                &text,
-                remarks(&found.notes),
-            ))
+            Ok(PythonResult::new(&found.json(), &text, remarks(&found.notes)))
         })
     }
 
@@ -692,10 +647,7 @@ impl CoreModel {
     ) -> PyResult<Vec<(String, String)>> {
         let Some(language) = CodeLanguage::from_name(language) else {
             let known: Vec<&str> = CodeLanguage::all().map(CodeLanguage::name).collect();
-            let says = format!(
-                "language={language:?}: expected one of {}",
-                known.join(", ")
-            );
+            let says = format!("language={language:?}: expected one of {}", known.join(", "));
             return Err(input_error(py, &says));
         };
         let code = CodeOptions {
@@ -705,10 +657,7 @@ impl CoreModel {
             self_test,
         };
         let files = self.run_interruptible(py, None, || self.model.generate(&code))?;
-        Ok(files
-            .into_iter()
-            .map(|file| (file.path, file.text))
-            .collect())
+        Ok(files.into_iter().map(|file| (file.path, file.text)).collect())
     }
 }
 

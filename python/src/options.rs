@@ -1,13 +1,9 @@
 //! Converts keywords of Python to options of the library, and refuses invalid values.
 
 use modelmill::diagnose::NamedEffect;
-use modelmill::excite::{
-    ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit,
-};
+use modelmill::excite::{ExcitationCriterion, ExcitationRequest, Options, SeparationRequest, TrajectoryLimit};
 use modelmill::identify::{EquationWeights, EstimateRefinement, EstimatorOptions};
-use modelmill::recording::{
-    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation,
-};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
 use modelmill::runs::{KnownLoad, PerRunSelection, RunsOptions};
 use pyo3::prelude::*;
 
@@ -50,14 +46,10 @@ impl ReadingOptions {
         let usual = StatePreparation::default();
         let order = self.order.unwrap_or(usual.order);
         if !(1..=MAX_FILTER_ORDER).contains(&order) {
-            return Err(format!(
-                "order={order}: expected 1 to {MAX_FILTER_ORDER}; 4 is usual"
-            ));
+            return Err(format!("order={order}: expected 1 to {MAX_FILTER_ORDER}; 4 is usual"));
         }
         if self.decimate == 0 {
-            return Err(
-                "decimate=0: expected an integer of at least 1; 1 keeps all samples".to_owned(),
-            );
+            return Err("decimate=0: expected an integer of at least 1; 1 keeps all samples".to_owned());
         }
         if let Some((from, to)) = self.between
             && !(from < to && from.is_finite() && to.is_finite())
@@ -69,11 +61,7 @@ impl ReadingOptions {
         Ok(RecordingOptions {
             columns: self.columns.clone(),
             preparation: StatePreparation {
-                cutoff_hz: check_positive(
-                    "cutoff_hz",
-                    self.cutoff_hz,
-                    "a frequency in Hz such as 25",
-                )?,
+                cutoff_hz: check_positive("cutoff_hz", self.cutoff_hz, "a frequency in Hz such as 25")?,
                 order,
                 trim: self.trim,
                 decimate: self.decimate,
@@ -131,26 +119,17 @@ pub(crate) struct EstimationOptions {
 impl EstimationOptions {
     /// The options of the library; fails with the first invalid value.
     pub(crate) fn estimation(&self) -> OptionResult<EstimatorOptions> {
-        let prior = check_positive(
-            "prior",
-            self.prior,
-            "a relative standard deviation such as 0.2",
-        )?;
+        let prior = check_positive("prior", self.prior, "a relative standard deviation such as 0.2")?;
         let refinement = match (prior, self.physical, self.essential) {
             (None, false, false) => EstimateRefinement::None,
             (Some(sigma), false, false) => EstimateRefinement::Prior(sigma),
             (None, true, false) => EstimateRefinement::Physical,
             (None, false, true) => EstimateRefinement::Essential,
             _ => {
-                return Err(
-                    "prior, physical and essential exclude each other; give one of them".to_owned(),
-                );
+                return Err("prior, physical and essential exclude each other; give one of them".to_owned());
             }
         };
-        if self
-            .standstill
-            .is_some_and(|part| !(part > 0.0 && part < 1.0))
-        {
+        if self.standstill.is_some_and(|part| !(part > 0.0 && part < 1.0)) {
             return Err("standstill: expected a number between 0 and 1, such as 0.01".to_owned());
         }
         Ok(EstimatorOptions {
@@ -254,11 +233,7 @@ impl ExcitationOptions {
                     "condition" => ExcitationCriterion::Condition,
                     "log_det" => ExcitationCriterion::LogDet,
                     other => {
-                        return Err(expected_one_of(
-                            "criterion",
-                            other,
-                            &["condition", "log_det"],
-                        ));
+                        return Err(expected_one_of("criterion", other, &["condition", "log_det"]));
                     }
                 },
                 random: self.random,

@@ -220,10 +220,7 @@ impl PythonExcitation {
     /// Times, then positions, rates and accelerations, a list per coordinate.
     fn motion<'py>(&self, py: Python<'py>) -> PreparedArrays<'py> {
         let all = |columns: &[Vec<f64>]| -> ArrayColumns<'py> {
-            columns
-                .iter()
-                .map(|column| PyArray1::from_slice(py, column))
-                .collect()
+            columns.iter().map(|column| PyArray1::from_slice(py, column)).collect()
         };
         let motion = &self.found.motion;
         (

@@ -93,9 +93,7 @@ pub(crate) fn reduce(
     progress: Option<Bound<'_, PyAny>>,
 ) -> PyResult<(PythonResult, String)> {
     let (host, listener) = new_host(Vec::new(), false);
-    let reduced = run_interruptible(py, &listener, progress.as_ref(), || {
-        host.reduce(&rig, plan.as_deref())
-    })?;
+    let reduced = run_interruptible(py, &listener, progress.as_ref(), || host.reduce(&rig, plan.as_deref()))?;
     let mut object = reduced.json("");
     if let Some(object) = object.as_object_mut() {
         object.shift_remove("out");

@@ -39,10 +39,7 @@ impl StepSpelling for PythonSpelling {
     }
 
     fn spell_separation(&self, _: &Model, separation: &SeparationProposal) -> Option<String> {
-        let mut call = format!(
-            "m.excite(separate={:?}",
-            effect_argument(&separation.effect)
-        );
+        let mut call = format!("m.excite(separate={:?}", effect_argument(&separation.effect));
         let rivals = separation.rivals.iter().map(|effect| {
             let effect = effect.clone();
             effect_argument(&NamedEffect {
@@ -53,11 +50,7 @@ impl StepSpelling for PythonSpelling {
         let list = |all: Vec<String>| format!("{all:?}");
         let _ = write!(call, ", apart_from={}", list(rivals.collect()));
         if !separation.common_effects.is_empty() {
-            let beside = separation
-                .common_effects
-                .iter()
-                .map(effect_argument)
-                .collect();
+            let beside = separation.common_effects.iter().map(effect_argument).collect();
             let _ = write!(call, ", beside={}", list(beside));
         }
         if let Some(noise) = separation.noise {
@@ -140,10 +133,7 @@ fn argument(setting: &OptionSetting) -> String {
 #[pyfunction]
 pub(crate) fn advised_names() -> (Vec<&'static str>, Vec<&'static str>) {
     let mut keywords = Vec::new();
-    let mut methods: Vec<&str> = CommandName::ALL
-        .iter()
-        .map(|c| method_of_command(*c))
-        .collect();
+    let mut methods: Vec<&str> = CommandName::ALL.iter().map(|c| method_of_command(*c)).collect();
     for option in OptionName::ALL {
         match spelled_option(*option) {
             PythonName::Keyword(keyword) => keywords.push(keyword),

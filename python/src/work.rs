@@ -92,8 +92,7 @@ pub(crate) fn run_interruptible<T: Send>(
         let mut stopped: Option<PyErr> = None;
         loop {
             let receiver = &mut receiver;
-            let Err(RecvTimeoutError::Timeout) = py.detach(move || receiver.recv_timeout(TICK))
-            else {
+            let Err(RecvTimeoutError::Timeout) = py.detach(move || receiver.recv_timeout(TICK)) else {
                 break;
             };
             // Progress is reported until the work is stopped.
@@ -120,10 +119,7 @@ pub(crate) fn run_interruptible<T: Send>(
 }
 
 /// Runs short work in this thread.
-pub(crate) fn run_blocking<T: Send>(
-    py: Python<'_>,
-    work: impl FnOnce() -> Outcome<T> + Send,
-) -> PyResult<T> {
+pub(crate) fn run_blocking<T: Send>(py: Python<'_>, work: impl FnOnce() -> Outcome<T> + Send) -> PyResult<T> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(found) => found.map_err(|error| library_error(py, &error)),
         Err(panic) => Err(panic_error(py, &*panic)),

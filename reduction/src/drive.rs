@@ -36,11 +36,7 @@ impl ContactPlace {
     pub(crate) fn projected_on_axis(self) -> Self {
         // The distance from the joint is kept, on the side of the joint on which the point is.
         let at = Vector2::new(self.at.norm().copysign(self.at.x), 0.0);
-        if self.part.is_some() {
-            Self { at, ..self }
-        } else {
-            self
-        }
+        if self.part.is_some() { Self { at, ..self } } else { self }
     }
 }
 
@@ -56,10 +52,8 @@ pub(crate) fn check_linear(
 ) {
     // Vector from the first to the second contact: projected truth, and model.
     let vectors = |moment: &MotionSample| {
-        let truth = plane.plane_position(&moment.place(&ends[1]))
-            - plane.plane_position(&moment.place(&ends[0]));
-        let [from, to] =
-            contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
+        let truth = plane.plane_position(&moment.place(&ends[1])) - plane.plane_position(&moment.place(&ends[0]));
+        let [from, to] = contacts.map(|contact| contact.plane_position(parts, moment, plane, samples));
         (truth, to - from)
     };
     // Errors of length and direction along the samples.
@@ -72,11 +66,7 @@ pub(crate) fn check_linear(
         truth.perp(&model).atan2(truth.dot(&model))
     });
     // The drive has a component along the normal if its points are not in one plane.
-    let out = samples.largest(|moment| {
-        plane
-            .normal
-            .dot(&(moment.place(&ends[1]) - moment.place(&ends[0])))
-    });
+    let out = samples.largest(|moment| plane.normal.dot(&(moment.place(&ends[1]) - moment.place(&ends[0]))));
     report.add(
         4,
         name,

@@ -6,13 +6,12 @@
 //!
 //! 1. planar reduction - `planar`: projection of bodies onto the plane;
 //! 2. substitution parts and lumped masses, eq. (1) - `part`;
-//! 3. symmetry: shared symbols - `draft`;
+//! 3. symmetry: shared symbols - `planar_draft`;
 //! 4. drives - `drive`.
 //!
 //! In addition, [`import`](fn@import) converts a robot description of other programs into a model file, and
 //! [`export`](fn@export) a model into a description.
 
-mod draft;
 mod drive;
 mod export;
 mod import;
@@ -21,6 +20,7 @@ mod part;
 mod plan;
 mod plan_for;
 mod planar;
+mod planar_draft;
 mod reduce;
 mod reduce_drives;
 mod reduce_parts;
@@ -30,8 +30,8 @@ mod write;
 
 pub use export::{DescriptionExport, DescriptionFormat as ExportFormat, ExportError, export};
 pub use import::{
-    DescriptionImport, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions,
-    expand_includes, import,
+    DescriptionImport, ImportError, ImportedJoint, LARGEST_DESCRIPTION, Options as ImportOptions, expand_includes,
+    import,
 };
 pub use plan::{ReductionPlan, plan, plan_file, plan_file_with};
 pub use plan_for::default_plan;

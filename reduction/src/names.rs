@@ -51,21 +51,12 @@ impl<'a> PlanNames<'a> {
     }
 
     /// The bodies of some groups. Adds the groups to `used`, and reports groups that were used before or do not exist.
-    pub(crate) fn bodies(
-        &self,
-        names: &[PlanName],
-        used: &mut Vec<String>,
-        log: &mut RigLog,
-    ) -> Vec<usize> {
+    pub(crate) fn bodies(&self, names: &[PlanName], used: &mut Vec<String>, log: &mut RigLog) -> Vec<usize> {
         // Each group may be used once, since its mass would be counted twice otherwise.
         let known: Vec<&str> = self.groups.iter().map(|(name, _)| name.as_str()).collect();
         let mut bodies = Vec::new();
         for name in names {
-            match self
-                .groups
-                .iter()
-                .find(|(group, _)| group == name.get_ref())
-            {
+            match self.groups.iter().find(|(group, _)| group == name.get_ref()) {
                 None => log.unknown_name(0, name, "group", &known),
                 Some(_) if used.contains(name.get_ref()) => {
                     report_duplicate(name, "part or lumped mass", log);
@@ -88,18 +79,9 @@ impl<'a> PlanNames<'a> {
             .iter()
             .find(|(model, _)| model.get_ref() == name.get_ref());
         let wanted = renamed.map_or(name, |(_, rig)| rig);
-        let found = self
-            .rig
-            .points
-            .iter()
-            .find(|point| &point.name == wanted.get_ref());
+        let found = self.rig.points.iter().find(|point| &point.name == wanted.get_ref());
         if found.is_none() {
-            let known: Vec<&str> = self
-                .rig
-                .points
-                .iter()
-                .map(|point| point.name.as_str())
-                .collect();
+            let known: Vec<&str> = self.rig.points.iter().map(|point| point.name.as_str()).collect();
             log.unknown_name(0, wanted, "point of the rig", &known);
         }
         found.map(|point| point.anchor)
@@ -117,16 +99,14 @@ impl<'a> PlanNames<'a> {
         let renamed = self.plan.points.iter().find(|(_, rig)| here(rig.get_ref()));
         // The name in the rig can be used only if no other point of the model has it.
         let free = |name: &str| self.plan.points.keys().all(|model| model.get_ref() != name);
-        renamed
-            .map(|(model, _)| model.get_ref().clone())
-            .or_else(|| {
-                let own = self
-                    .rig
-                    .points
-                    .iter()
-                    .find(|point| &point.anchor == anchor && free(&point.name));
-                own.map(|point| point.name.clone())
-            })
+        renamed.map(|(model, _)| model.get_ref().clone()).or_else(|| {
+            let own = self
+                .rig
+                .points
+                .iter()
+                .find(|point| &point.anchor == anchor && free(&point.name));
+            own.map(|point| point.name.clone())
+        })
     }
 
     /// The index of the part of a point; none for the base. Only points of leading bodies are in the model.
@@ -141,17 +121,11 @@ impl<'a> PlanNames<'a> {
         let Some(body) = anchor.body else {
             return Ok(None);
         };
-        let part = parts
-            .iter()
-            .position(|part| part.bodies.first() == Some(&body));
+        let part = parts.iter().position(|part| part.bodies.first() == Some(&body));
         if part.is_none() {
             let leads: Vec<&str> = parts
                 .iter()
-                .filter_map(|part| {
-                    part.bodies
-                        .first()
-                        .map(|lead| self.rig.bodies[*lead].name.as_str())
-                })
+                .filter_map(|part| part.bodies.first().map(|lead| self.rig.bodies[*lead].name.as_str()))
                 .collect();
             log.error(
                 source_span(0, &name.span()),

@@ -33,18 +33,13 @@ impl SubstitutionPart {
     pub(crate) fn nominal_angle(&self, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         let nominal = &samples.nominal;
         // From the joint to the end of the axis, in the plane.
-        let axis = plane.plane_position(&nominal.place(&self.to))
-            - plane.plane_position(&nominal.place(&self.joint[1]));
+        let axis =
+            plane.plane_position(&nominal.place(&self.to)) - plane.plane_position(&nominal.place(&self.joint[1]));
         axis.y.atan2(axis.x)
     }
 
     /// Its rotation since the nominal configuration, rad, between -pi and pi.
-    pub(crate) fn rotation_angle(
-        &self,
-        moment: &MotionSample,
-        plane: &MotionPlane,
-        samples: &MotionSamples,
-    ) -> f64 {
+    pub(crate) fn rotation_angle(&self, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
         body_rotation(self.bodies[0], moment, plane, samples)
     }
 
@@ -57,8 +52,7 @@ impl SubstitutionPart {
     ) -> Vector2<f64> {
         let nominal = &samples.nominal;
         // Relative to the joint, turned into the axes of the part.
-        let d = plane.plane_position(&nominal.place(anchor))
-            - plane.plane_position(&nominal.place(&self.joint[1]));
+        let d = plane.plane_position(&nominal.place(anchor)) - plane.plane_position(&nominal.place(&self.joint[1]));
         rotation(-self.nominal_angle(plane, samples)) * d
     }
 
@@ -70,8 +64,7 @@ impl SubstitutionPart {
         plane: &MotionPlane,
         samples: &MotionSamples,
     ) -> Vector2<f64> {
-        let angle =
-            self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
+        let angle = self.nominal_angle(plane, samples) + self.rotation_angle(moment, plane, samples);
         plane.plane_position(&moment.place(&self.joint[1])) + self.shift + rotation(angle) * local
     }
 }
@@ -83,12 +76,7 @@ pub(crate) fn rotation(angle: f64) -> Matrix2<f64> {
 }
 
 /// The rotation of a body about the normal since the nominal configuration, rad.
-fn body_rotation(
-    body: usize,
-    moment: &MotionSample,
-    plane: &MotionPlane,
-    samples: &MotionSamples,
-) -> f64 {
+fn body_rotation(body: usize, moment: &MotionSample, plane: &MotionPlane, samples: &MotionSamples) -> f64 {
     // The direction of the body that was along x of the plane in the nominal configuration.
     let then = samples.nominal.motion.bodies[body].R_WB.transpose() * plane.x;
     let now = plane.components(&(moment.motion.bodies[body].R_WB * then));
@@ -117,10 +105,7 @@ pub(crate) fn substitute(
         let seen = planar_body(rig, body, plane, samples);
         // A body of the part must not rotate relative to the leading one.
         let twist = samples.largest(|moment| {
-            wrap_angle(
-                body_rotation(body, moment, plane, samples)
-                    - body_rotation(lead, moment, plane, samples),
-            )
+            wrap_angle(body_rotation(body, moment, plane, samples) - body_rotation(lead, moment, plane, samples))
         });
         let solid = crate::planar::spatial_body(rig, body);
         let at = BodyAnchor {
@@ -171,8 +156,7 @@ fn fit_carried_point(
     for (i, moment) in moments().enumerate() {
         // Position relative to the joint: rotation times arm, plus shift.
         let (s, c) = part.rotation_angle(moment, plane, samples).sin_cos();
-        let d = plane.plane_position(&moment.place(at))
-            - plane.plane_position(&moment.place(&part.joint[1]));
+        let d = plane.plane_position(&moment.place(at)) - plane.plane_position(&moment.place(&part.joint[1]));
         for (row, values) in [(2 * i, [c, -s, 1.0, 0.0]), (2 * i + 1, [s, c, 0.0, 1.0])] {
             for (k, value) in values.into_iter().enumerate() {
                 matrix[(row, k)] = value;
@@ -188,8 +172,7 @@ fn fit_carried_point(
         matrix.clone().svd(true, true).solve(&right, 1e-9).ok()
     };
     // Otherwise the arm is the position in the nominal configuration, without a shift.
-    let x = solved
-        .unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
+    let x = solved.unwrap_or_else(|| DVector::from_vec(vec![right[2 * n - 2], right[2 * n - 1], 0.0, 0.0]));
     let strays = (matrix * &x - right).amax();
     (Vector2::new(x[0], x[1]), Vector2::new(x[2], x[3]), strays)
 }
@@ -198,21 +181,13 @@ fn fit_carried_point(
 pub(crate) fn merge_bodies(flats: &[PlanarBody]) -> PlanarBody {
     let mass: f64 = flats.iter().map(|flat| flat.mass).sum();
     let moment: Vector2<f64> = flats.iter().map(|flat| flat.mass * flat.centre).sum();
-    let centre = if mass > 0.0 {
-        moment / mass
-    } else {
-        Vector2::zeros()
-    };
+    let centre = if mass > 0.0 { moment / mass } else { Vector2::zeros() };
     // Inertias about the common centre add up.
     let inertia = flats
         .iter()
         .map(|flat| flat.inertia + flat.mass * (flat.centre - centre).norm_squared())
         .sum();
-    PlanarBody {
-        mass,
-        centre,
-        inertia,
-    }
+    PlanarBody { mass, centre, inertia }
 }
 
 /// The three residuals of eq. (1) between the exact values of a part and those of the model.
@@ -273,11 +248,7 @@ pub(crate) fn lump_mass(
         most
     });
     let mut sizes = part_residuals(&whole, &merge_bodies(&masses));
-    sizes.push(AssumptionSize::new(
-        "largest rate of rotation",
-        turns,
-        "rad/s",
-    ));
+    sizes.push(AssumptionSize::new("largest rate of rotation", turns, "rad/s"));
     sizes.push(AssumptionSize::new(
         "largest difference of acceleration",
         strays,

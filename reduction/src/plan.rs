@@ -231,12 +231,11 @@ pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
     // Faults of the syntax end the reading; those of the values are collected.
     let entry: PlanEntry = parse(text, 0).map_err(|found| fail(vec![*found]))?;
     let mut log = RigLog::default();
-    let one =
-        |log: &mut RigLog, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
-            if is_bad {
-                log.error(source_span(0, &range), says.to_owned(), label, "");
-            }
-        };
+    let one = |log: &mut RigLog, is_bad: bool, range: std::ops::Range<usize>, says: &str, label: &str| {
+        if is_bad {
+            log.error(source_span(0, &range), says.to_owned(), label, "");
+        }
+    };
     one(
         &mut log,
         *entry.schema.get_ref() != 1,
@@ -266,8 +265,7 @@ pub fn plan(path: &str, text: &str) -> Result<ReductionPlan, LoadFailure> {
         "expected two directions in `[plane]` that are not parallel",
     );
     // Limits of the number of samples and of their range.
-    let is_sound =
-        (4..=100_000).contains(&samples.number) && samples.range > 0.0 && samples.range <= 10.0;
+    let is_sound = (4..=100_000).contains(&samples.number) && samples.range > 0.0 && samples.range <= 10.0;
     one(
         &mut log,
         !is_sound,

@@ -55,21 +55,14 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
             continue;
         }
         // The end that is carried already is on the carrier, the other one on the new part.
-        let (at, from) = if is_carried(&carried, a.body) {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        let (at, from) = if is_carried(&carried, a.body) { (a, b) } else { (b, a) };
         let Some(body) = from.body else { continue };
         carried[body] = true;
         // The part with its joint, the end of its axis and its coordinate.
         let end = far_end(&rig, &hinges, body, &from.at);
-        let points = [at, from, BodyAnchor { at: end, ..from }]
-            .map(|anchor| add_point(&mut rig, &name, anchor));
+        let points = [at, from, BodyAnchor { at: end, ..from }].map(|anchor| add_point(&mut rig, &name, anchor));
         let part = &rig.bodies[body].name;
-        let on = at
-            .body
-            .map_or("base", |carrier| rig.bodies[carrier].name.as_str());
+        let on = at.body.map_or("base", |carrier| rig.bodies[carrier].name.as_str());
         let coordinate = rig
             .coordinate_of_joint(joint)
             .map_or(name, |c| rig.coordinates[c].name.clone());
@@ -89,19 +82,13 @@ pub fn default_plan(rig: &Rig) -> Result<ReductionPlan, Message> {
     }
     text.push_str(&loops);
     // Read the text like the file of a plan.
-    let mut plan =
-        plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
+    let mut plan = plan("the plan generated for this rig", &text).map_err(|failure| failure.render(false))?;
     plan.rig = Some(Box::new(rig));
     Ok(plan)
 }
 
 /// The end of a body's longitudinal axis: its farthest other joint, else its centre of mass, else a point along x.
-fn far_end(
-    rig: &Rig,
-    hinges: &[(usize, [BodyAnchor; 2])],
-    body: usize,
-    from: &Vector3<f64>,
-) -> Vector3<f64> {
+fn far_end(rig: &Rig, hinges: &[(usize, [BodyAnchor; 2])], body: usize, from: &Vector3<f64>) -> Vector3<f64> {
     // Other joints on the body.
     let here = hinges
         .iter()

@@ -29,11 +29,7 @@ pub(crate) fn spatial_body(rig: &Rig, body: usize) -> SpatialBody {
         centre: own.centre,
         inertia: own.inertia,
     }];
-    for lumped in rig
-        .lumped_masses
-        .iter()
-        .filter(|lumped| lumped.at.body == Some(body))
-    {
+    for lumped in rig.lumped_masses.iter().filter(|lumped| lumped.at.body == Some(body)) {
         parts.push(SpatialBody {
             mass: lumped.mass,
             centre: lumped.at.at,
@@ -48,11 +44,7 @@ fn merge_spatial(parts: &[SpatialBody]) -> SpatialBody {
     let mass: f64 = parts.iter().map(|part| part.mass).sum();
     // Without mass the centre has no meaning; any place is permitted.
     let moment: Vector3<f64> = parts.iter().map(|part| part.mass * part.centre).sum();
-    let centre = if mass > 0.0 {
-        moment / mass
-    } else {
-        parts[0].centre
-    };
+    let centre = if mass > 0.0 { moment / mass } else { parts[0].centre };
     let about = |part: &SpatialBody| {
         let d = part.centre - centre;
         part.inertia + part.mass * (Matrix3::identity() * d.norm_squared() - d * d.transpose())
@@ -76,12 +68,7 @@ pub(crate) struct PlanarBody {
 }
 
 /// The projection of a body onto the plane, in the nominal configuration.
-pub(crate) fn planar_body(
-    rig: &Rig,
-    body: usize,
-    plane: &MotionPlane,
-    samples: &MotionSamples,
-) -> PlanarBody {
+pub(crate) fn planar_body(rig: &Rig, body: usize, plane: &MotionPlane, samples: &MotionSamples) -> PlanarBody {
     let solid = spatial_body(rig, body);
     // The moment about the normal, in the axes of the body.
     let moves = &samples.nominal.motion.bodies[body];

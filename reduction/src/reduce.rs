@@ -1,10 +1,10 @@
 //! Runs the four steps of a reduction: a rig and a plan go in, the text of a model file and the report come out.
 
-use crate::draft::PlanarDraft;
 use crate::names::PlanNames;
 use crate::part::SubstitutionPart;
 use crate::plan::ReductionPlan;
 use crate::planar::{PlanarBody, check_group, out_of_plane_rate};
+use crate::planar_draft::PlanarDraft;
 use crate::report::{AssumptionSize, ReductionReport};
 use crate::samples::{MotionPlane, MotionSamples};
 use crate::write::{model_file, significant_digits};
@@ -53,11 +53,7 @@ pub fn reduce(rig: &Rig, plan: &ReductionPlan) -> Result<PlanarReduction, LoadFa
 }
 
 /// Runs all steps; `None` if the log has faults after which the others make no sense.
-fn run(
-    rig: &Rig,
-    plan: &ReductionPlan,
-    log: &mut RigLog,
-) -> Option<(PlanarDraft, ReductionReport)> {
+fn run(rig: &Rig, plan: &ReductionPlan, log: &mut RigLog) -> Option<(PlanarDraft, ReductionReport)> {
     let entry = &plan.entry;
     // Groups, the plane of motion, and samples of the rig's motion.
     let names = PlanNames::new(rig, entry, log);
@@ -117,12 +113,7 @@ fn run(
     let draft = work.draft;
     let mut report = work.report;
     // Symbols that stand for several quantities, with the differences between their values.
-    for symbols in [
-        &draft.masses,
-        &draft.centres,
-        &draft.inertias,
-        &draft.constants,
-    ] {
+    for symbols in [&draft.masses, &draft.centres, &draft.inertias, &draft.constants] {
         symbols.report_ties(&mut report);
     }
     Some((draft, report))
@@ -173,11 +164,7 @@ impl ReductionState<'_> {
             1,
             "motion",
             format!("all bodies stay in the plane at {poses} sampled poses{reach}"),
-            vec![AssumptionSize::new(
-                "largest rate out of it",
-                out,
-                "m/s or rad/s",
-            )],
+            vec![AssumptionSize::new("largest rate out of it", out, "m/s or rad/s")],
         );
         // Gravity in the plane; the component out of it loads bearings only.
         let across = self.plane.normal.dot(&rig.gravity);
@@ -186,17 +173,12 @@ impl ReductionState<'_> {
             1,
             "gravity",
             "acts in the plane",
-            vec![AssumptionSize::new(
-                "component out of the plane",
-                across,
-                "m/s^2",
-            )],
+            vec![AssumptionSize::new("component out of the plane", across, "m/s^2")],
         );
         // One symbol `g` with a sign if gravity is along an axis, else two components.
         self.draft.gravity = match (flat.x.abs() > ZERO, flat.y.abs() > ZERO) {
             (false, false) => ["0", "0"].map(str::to_owned),
-            (true, true) => [("gx", flat.x), ("gy", flat.y)]
-                .map(|(name, value)| self.gravity_constant(name, value)),
+            (true, true) => [("gx", flat.x), ("gy", flat.y)].map(|(name, value)| self.gravity_constant(name, value)),
             (true, false) => [
                 signed_name(self.gravity_constant("g", flat.x.abs()), flat.x),
                 "0".to_owned(),
@@ -208,14 +190,7 @@ impl ReductionState<'_> {
         };
         // The size of what the plane neglects in each group.
         for (name, bodies) in &self.names.groups {
-            check_group(
-                rig,
-                name,
-                bodies,
-                &self.plane,
-                &self.samples,
-                &mut self.report,
-            );
+            check_group(rig, name, bodies, &self.plane, &self.samples, &mut self.report);
         }
     }
 
@@ -230,9 +205,5 @@ impl ReductionState<'_> {
 
 /// The name with the sign of a value.
 fn signed_name(name: String, value: f64) -> String {
-    if value < 0.0 {
-        format!("-{name}")
-    } else {
-        name
-    }
+    if value < 0.0 { format!("-{name}") } else { name }
 }

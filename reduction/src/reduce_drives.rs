@@ -3,9 +3,9 @@
 
 use modelmill_rig::{RigLog, source_span};
 
-use crate::draft::DraftEffect;
 use crate::drive::check_linear;
 use crate::plan::PlanName;
+use crate::planar_draft::DraftEffect;
 use crate::reduce::{ReductionState, TOLERANCE};
 use crate::report::AssumptionSize;
 use crate::write::significant_digits;
@@ -30,9 +30,7 @@ impl ReductionState<'_> {
                 self.contact_place(&anchor, part)
             });
             let gap = self.samples.largest(|moment| {
-                let [p, r] = places.map(|place| {
-                    place.plane_position(&self.parts, moment, &self.plane, &self.samples)
-                });
+                let [p, r] = places.map(|place| place.plane_position(&self.parts, moment, &self.plane, &self.samples));
                 (p - r).norm()
             });
             // Points that do not coincide in the samples are no loop.
@@ -54,9 +52,7 @@ impl ReductionState<'_> {
                 format!("closes where {first} coincides with {second}"),
                 vec![AssumptionSize::new("gap", gap, "m")],
             );
-            self.draft
-                .loops
-                .push((entry.name.get_ref().clone(), [first, second]));
+            self.draft.loops.push((entry.name.get_ref().clone(), [first, second]));
         }
     }
 
@@ -74,23 +70,14 @@ impl ReductionState<'_> {
             log.unknown_name(0, &entry.name, "drive of the rig", &known);
         }
         for (d, drive) in rig.drives.iter().enumerate() {
-            let entry = plan
-                .drive
-                .iter()
-                .find(|entry| entry.name.get_ref() == &drive.name);
+            let entry = plan.drive.iter().find(|entry| entry.name.get_ref() == &drive.name);
             // Place for messages, and the ends of a linear drive; other drives act at a joint.
             let here = entry.map_or_else(|| &plan.name, |entry| &entry.name);
             let Some(ends) = rig.ends_of_drive(d) else {
-                let coordinate = rig
-                    .coordinate_of_drive(d)
-                    .map(|c| rig.coordinates[c].name.clone());
+                let coordinate = rig.coordinate_of_drive(d).map(|c| rig.coordinates[c].name.clone());
                 // The coordinate must be an active one of the model.
-                let active = coordinate.filter(|name| {
-                    self.draft
-                        .coordinates
-                        .iter()
-                        .any(|c| &c.name == name && !c.passive)
-                });
+                let active =
+                    coordinate.filter(|name| self.draft.coordinates.iter().any(|c| &c.name == name && !c.passive));
                 match active {
                     Some(coordinate) => {
                         self.report
@@ -99,10 +86,7 @@ impl ReductionState<'_> {
                     }
                     None => log.error(
                         source_span(0, &here.span()),
-                        format!(
-                            "the joint of the drive `{}` is not the joint of a part",
-                            drive.name
-                        ),
+                        format!("the joint of the drive `{}` is not the joint of a part", drive.name),
                         "",
                         "write the joint's coordinate as `coordinate` of the part at this joint",
                     ),
@@ -156,9 +140,7 @@ impl ReductionState<'_> {
             let (kind, values) = effect.law.kind_and_values();
             // Only effects at drives have the same place in the model.
             let drive = |place: &modelmill_rig::RigPlace| match place {
-                modelmill_rig::RigPlace::Drive(d) => {
-                    rig.drives.get(*d).map(|drive| drive.name.clone())
-                }
+                modelmill_rig::RigPlace::Drive(d) => rig.drives.get(*d).map(|drive| drive.name.clone()),
                 _ => None,
             };
             let at: Vec<String> = effect.places.iter().filter_map(drive).collect();
@@ -166,12 +148,8 @@ impl ReductionState<'_> {
             // The model needs the same kind of effect, with all its places.
             let known = library.iter().find(|known| known.name == kind);
             let Some(known) = known.filter(|_| at.len() == effect.places.len()) else {
-                self.report.add(
-                    4,
-                    kind,
-                    "acts in the rig and is left out of the model",
-                    Vec::new(),
-                );
+                self.report
+                    .add(4, kind, "acts in the rig and is left out of the model", Vec::new());
                 continue;
             };
             let is_parameter = |symbol: &str| known.parameters.iter().any(|p| p.symbol == symbol);
@@ -187,12 +165,8 @@ impl ReductionState<'_> {
                 .into_iter()
                 .map(|(symbol, value)| (symbol.to_owned(), value))
                 .partition(|(symbol, _)| is_parameter(symbol));
-            self.report.add(
-                4,
-                kind,
-                format!("at {} as in the rig", at.join(", ")),
-                Vec::new(),
-            );
+            self.report
+                .add(4, kind, format!("at {} as in the rig", at.join(", ")), Vec::new());
             self.draft.effects.push(DraftEffect {
                 kind: kind.to_owned(),
                 at,
@@ -207,9 +181,7 @@ impl ReductionState<'_> {
     pub(crate) fn check_completeness(&mut self, log: &mut RigLog) {
         let (rig, plan) = (self.names.rig, self.names.plan);
         // Bodies that the plan leaves out on purpose, with the size of what is neglected.
-        let left = self
-            .names
-            .bodies(&plan.leave_out, &mut self.used_groups, log);
+        let left = self.names.bodies(&plan.leave_out, &mut self.used_groups, log);
         for body in left {
             let solid = crate::planar::spatial_body(rig, body);
             self.report.add(
@@ -245,10 +217,7 @@ impl ReductionState<'_> {
             .iter()
             .filter(|lumped| lumped.at.at != lumped.moment_at);
         for lumped in split {
-            let about = lumped
-                .at
-                .body
-                .map_or("base", |body| rig.bodies[body].name.as_str());
+            let about = lumped.at.body.map_or("base", |body| rig.bodies[body].name.as_str());
             let says = "has a mass with a different position in the balance of moments; the model uses the position of the \
                         balance of forces";
             self.report.add(
@@ -266,21 +235,13 @@ impl ReductionState<'_> {
 
     /// Reports constants of the plan for quantities that the model does not have.
     pub(crate) fn check_constants(&self, log: &mut RigLog) {
-        for is in self
-            .names
-            .plan
-            .constants
-            .values()
-            .flat_map(|constant| &constant.is)
-        {
+        for is in self.names.plan.constants.values().flat_map(|constant| &constant.is) {
             // The quantity must occur in the model.
             let symbols = &self.draft.constants.0;
-            if !symbols.iter().any(|symbol| {
-                symbol
-                    .stands_for
-                    .iter()
-                    .any(|(what, _)| what == is.get_ref())
-            }) {
+            if !symbols
+                .iter()
+                .any(|symbol| symbol.stands_for.iter().any(|(what, _)| what == is.get_ref()))
+            {
                 let known: Vec<&str> = symbols
                     .iter()
                     .flat_map(|s| s.stands_for.iter().map(|(what, _)| what.as_str()))

@@ -4,11 +4,11 @@
 use modelmill_rig::{BodyAnchor, RigLog, source_span};
 use nalgebra::Vector2;
 
-use crate::draft::{DraftCoordinate, DraftFrame, DraftPart, DraftPoint, round_to_12_digits};
 use crate::drive::ContactPlace;
 use crate::part::{SubstitutionPart, lump_mass, part_residuals, substitute};
 use crate::plan::{PlanName, PlanPartEntry};
 use crate::planar::PlanarBody;
+use crate::planar_draft::{DraftCoordinate, DraftFrame, DraftPart, DraftPoint, round_to_12_digits};
 use crate::reduce::{ReductionState, TOLERANCE, ZERO};
 use crate::samples::MotionSample;
 use crate::write::significant_digits;
@@ -19,11 +19,7 @@ impl ReductionState<'_> {
         // A part may be carried by parts before it only, so that one pass is enough.
         let plan = self.names.plan;
         for entry in &plan.part {
-            if self
-                .parts
-                .iter()
-                .any(|part| &part.name == entry.name.get_ref())
-            {
+            if self.parts.iter().any(|part| &part.name == entry.name.get_ref()) {
                 log.error(
                     source_span(0, &entry.name.span()),
                     "two parts have this name".to_owned(),
@@ -114,15 +110,11 @@ impl ReductionState<'_> {
         // The shift of a part is the shift of its carrier plus the gap at the joint, which must be constant.
         let carried = parent.map_or_else(Vector2::zeros, |parent| self.parts[parent].shift);
         let gap = |moment: &MotionSample| {
-            self.plane.plane_position(&moment.place(&at))
-                - self.plane.plane_position(&moment.place(&from))
-                + carried
+            self.plane.plane_position(&moment.place(&at)) - self.plane.plane_position(&moment.place(&from)) + carried
         };
         part.shift = gap(&self.samples.nominal);
         // The gap changes along the samples if the points are no joint.
-        let strays = self
-            .samples
-            .largest(|moment| (gap(moment) - part.shift).norm());
+        let strays = self.samples.largest(|moment| (gap(moment) - part.shift).norm());
         if strays > TOLERANCE || strays.is_nan() {
             log.error(
                 source_span(0, &entry.from.span()),
@@ -158,22 +150,13 @@ impl ReductionState<'_> {
         // Whether the rig has a coordinate with this name.
         let coordinate = entry.coordinate.get_ref();
         let nominal = wrap_angle(angle(&samples.nominal));
-        let active = self
-            .names
-            .rig
-            .coordinates
-            .iter()
-            .position(|c| &c.name == coordinate);
+        let active = self.names.rig.coordinates.iter().position(|c| &c.name == coordinate);
         let mut expression = coordinate.clone();
         if let Some(k) = active {
             // Largest difference between the angle and the coordinate of the rig, for each sign.
             let strays = |sign: f64| {
                 samples.largest(|moment| {
-                    wrap_angle(
-                        angle(moment)
-                            - nominal
-                            - sign * (moment.state.q[k] - samples.nominal.state.q[k]),
-                    )
+                    wrap_angle(angle(moment) - nominal - sign * (moment.state.q[k] - samples.nominal.state.q[k]))
                 })
             };
             // The coordinate may count in either direction.
@@ -181,10 +164,7 @@ impl ReductionState<'_> {
             if ahead.min(back) > TOLERANCE {
                 log.error(
                     source_span(0, &entry.coordinate.span()),
-                    format!(
-                        "`{coordinate}` of the rig is not the angle of `{}`",
-                        part.name
-                    ),
+                    format!("`{coordinate}` of the rig is not the angle of `{}`", part.name),
                     "expected the coordinate of its joint",
                     "a name that the rig does not have gives a passive coordinate",
                 );
@@ -255,13 +235,9 @@ impl ReductionState<'_> {
             return format!(" {sign} {}*pi/12", twelfths.round().abs());
         }
         let name = format!("{coordinate}_offset");
-        self.draft.constants.add_value(
-            &name,
-            "rad",
-            "from the rig's zero to the part's axis",
-            &name,
-            offset,
-        );
+        self.draft
+            .constants
+            .add_value(&name, "rad", "from the rig's zero to the part's axis", &name, offset);
         format!(" + {name}")
     }
 
@@ -283,24 +259,13 @@ impl ReductionState<'_> {
                 .find(|(_, c)| c.is.iter().any(|is| is.get_ref() == &what));
             let own = format!("{point}_{axis}");
             let (name, note) = match named {
-                Some((name, constant)) => (
-                    name.get_ref().clone(),
-                    constant.note.clone().unwrap_or_default(),
-                ),
+                Some((name, constant)) => (name.get_ref().clone(), constant.note.clone().unwrap_or_default()),
                 None => (own, String::new()),
             };
             // A constant can stand for several quantities; each is added once.
-            let symbol = self
-                .draft
-                .constants
-                .0
-                .iter()
-                .find(|symbol| symbol.name == name);
-            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what))
-            {
-                self.draft
-                    .constants
-                    .add_value(&name, "m", &note, &what, value);
+            let symbol = self.draft.constants.0.iter().find(|symbol| symbol.name == name);
+            if symbol.is_none_or(|symbol| symbol.stands_for.iter().all(|(known, _)| known != &what)) {
+                self.draft.constants.add_value(&name, "m", &note, &what, value);
             }
             *axis = name;
         }
@@ -313,22 +278,11 @@ impl ReductionState<'_> {
             return;
         };
         // These groups are in the model now.
-        self.used_groups.extend(
-            entry
-                .groups
-                .get_ref()
-                .iter()
-                .map(|name| name.get_ref().clone()),
-        );
+        self.used_groups
+            .extend(entry.groups.get_ref().iter().map(|name| name.get_ref().clone()));
         let name = part.name.clone();
         // Exact values of the part, eq. (1).
-        let whole = substitute(
-            self.names.rig,
-            part,
-            &self.plane,
-            &self.samples,
-            &mut self.report,
-        );
+        let whole = substitute(self.names.rig, part, &self.plane, &self.samples, &mut self.report);
         // Whether the plan leaves out the component of the centre across the axis.
         let drops = match entry.off_axis.as_ref().map(|s| s.get_ref().as_str()) {
             None | Some("keep") => false,
@@ -348,9 +302,7 @@ impl ReductionState<'_> {
         // Symbols with their values; parts may share a symbol.
         let [mass, centre, across, inertia] = symbols_of(entry);
         let draft = &mut self.draft;
-        draft
-            .masses
-            .add_value(&mass, "kg", &about("mass"), &name, whole.mass);
+        draft.masses.add_value(&mass, "kg", &about("mass"), &name, whole.mass);
         draft.inertias.add_value(
             &inertia,
             "kg m^2",
@@ -426,8 +378,7 @@ impl ReductionState<'_> {
                 centre: Vector2::new(value(&part.centre[0]), value(&part.centre[1])),
                 inertia: draft.inertias.value(&part.inertia),
             };
-            self.report
-                .add(2, &part.on, says, part_residuals(whole, &said));
+            self.report.add(2, &part.on, says, part_residuals(whole, &said));
         }
     }
 
@@ -435,9 +386,7 @@ impl ReductionState<'_> {
     pub(crate) fn lumped_masses(&mut self, log: &mut RigLog) {
         let plan = self.names.plan;
         for entry in &plan.lumped_mass {
-            let bodies = self
-                .names
-                .bodies(entry.groups.get_ref(), &mut self.used_groups, log);
+            let bodies = self.names.bodies(entry.groups.get_ref(), &mut self.used_groups, log);
             let points: Vec<(String, BodyAnchor)> = entry
                 .at
                 .get_ref()
@@ -470,13 +419,8 @@ impl ReductionState<'_> {
                 &mut self.report,
             );
             let symbol = entry.symbol.clone().unwrap_or_else(|| format!("m_{name}"));
-            let note = entry
-                .note
-                .clone()
-                .unwrap_or_else(|| format!("mass of {name}"));
-            self.draft
-                .masses
-                .add_value(&symbol, "kg", &note, name, mass);
+            let note = entry.note.clone().unwrap_or_else(|| format!("mass of {name}"));
+            self.draft.masses.add_value(&symbol, "kg", &note, name, mass);
             // Equal shares of the mass at each point.
             for (point, _) in &points {
                 let one = if points.len() == 1 {
@@ -492,11 +436,7 @@ impl ReductionState<'_> {
     }
 
     /// Name and anchor of a point of the model; adds the point to the draft at its first use. None after a fault.
-    pub(crate) fn model_point(
-        &mut self,
-        name: &PlanName,
-        log: &mut RigLog,
-    ) -> Option<(String, BodyAnchor)> {
+    pub(crate) fn model_point(&mut self, name: &PlanName, log: &mut RigLog) -> Option<(String, BodyAnchor)> {
         let anchor = self.names.point(name, log)?;
         // The part that carries the point, and the position there.
         let part = self.names.owner(&self.parts, &anchor, name, log).ok()?;
@@ -508,9 +448,7 @@ impl ReductionState<'_> {
     /// The position of an anchor in the frame of its part, or in the plane.
     pub(crate) fn contact_place(&self, anchor: &BodyAnchor, part: Option<usize>) -> ContactPlace {
         let at = match part {
-            None => self
-                .plane
-                .plane_position(&self.samples.nominal.place(anchor)),
+            None => self.plane.plane_position(&self.samples.nominal.place(anchor)),
             Some(part) => self.parts[part].local_position(anchor, &self.plane, &self.samples),
         };
         ContactPlace { part, at }

@@ -54,13 +54,7 @@ impl AssumptionSize {
 
 impl ReductionReport {
     /// Adds a finding.
-    pub(crate) fn add(
-        &mut self,
-        step: u8,
-        about: &str,
-        says: impl Into<String>,
-        sizes: Vec<AssumptionSize>,
-    ) {
+    pub(crate) fn add(&mut self, step: u8, about: &str, says: impl Into<String>, sizes: Vec<AssumptionSize>) {
         self.findings.push(ReductionFinding {
             step,
             about: about.to_owned(),
@@ -80,11 +74,8 @@ impl ReductionReport {
         let mut text = String::new();
         for (step, title) in (1..).zip(titles) {
             // Steps without findings have no title.
-            let findings: Vec<&ReductionFinding> = self
-                .findings
-                .iter()
-                .filter(|finding| finding.step == step)
-                .collect();
+            let findings: Vec<&ReductionFinding> =
+                self.findings.iter().filter(|finding| finding.step == step).collect();
             if findings.is_empty() {
                 continue;
             }

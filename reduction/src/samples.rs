@@ -126,10 +126,10 @@ impl MotionSamples {
 
     /// The largest magnitude of a quantity over all samples; NaN if any is NaN.
     pub(crate) fn largest(&self, of: impl Fn(&MotionSample) -> f64) -> f64 {
-        self.moments.iter().map(of).fold(
-            0.0,
-            |most: f64, x| if x.is_nan() { x } else { most.max(x.abs()) },
-        )
+        self.moments
+            .iter()
+            .map(of)
+            .fold(0.0, |most: f64, x| if x.is_nan() { x } else { most.max(x.abs()) })
     }
 }
 
@@ -137,11 +137,7 @@ impl MotionSamples {
 /// state and one force per drive (N or N m). Poses that cannot be reached are left out.
 ///
 /// Fails if the rig cannot be assembled, or its drives cannot balance a load.
-pub fn sampled_forces(
-    rig: &Rig,
-    number: usize,
-    range: f64,
-) -> Result<Vec<(RigState, Vec<f64>)>, RigPoseError> {
+pub fn sampled_forces(rig: &Rig, number: usize, range: f64) -> Result<Vec<(RigState, Vec<f64>)>, RigPoseError> {
     let samples = MotionSamples::new(rig, number, range)?;
     let moments = samples.moments.into_iter();
     moments

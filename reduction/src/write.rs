@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::draft::{DraftSymbol, DraftSymbols, PlanarDraft};
+use crate::planar_draft::{DraftSymbol, DraftSymbols, PlanarDraft};
 
 /// The text of a model file.
 pub(crate) fn model_file(draft: &PlanarDraft) -> String {
@@ -36,11 +36,7 @@ pub(crate) fn model_file(draft: &PlanarDraft) -> String {
     // Coordinates, then the tables that refer to them.
     text.push_str("\n[coordinates]\n");
     for coordinate in &draft.coordinates {
-        let passive = if coordinate.passive {
-            ", passive = true"
-        } else {
-            ""
-        };
+        let passive = if coordinate.passive { ", passive = true" } else { "" };
         let _ = writeln!(
             text,
             "{} = {{ nominal = {}{passive} }}",
@@ -57,11 +53,7 @@ pub(crate) fn model_file(draft: &PlanarDraft) -> String {
 /// Tables `[[frame]]` and `[[point]]`. A frame with an offset along x only is written with modified DH parameters.
 fn frames_and_points(text: &mut String, draft: &PlanarDraft) {
     for frame in &draft.frames {
-        let _ = writeln!(
-            text,
-            "\n[[frame]]\nname = \"{}\"\non = \"{}\"",
-            frame.name, frame.on
-        );
+        let _ = writeln!(text, "\n[[frame]]\nname = \"{}\"\non = \"{}\"", frame.name, frame.on);
         // The z axis of every frame is the normal of the plane.
         let [x, y] = &frame.at;
         let _ = match (x.as_str(), y.as_str()) {
@@ -112,10 +104,7 @@ fn masses(text: &mut String, draft: &PlanarDraft) {
         );
     }
     for (name, mass, shares, at) in &draft.lumped_masses {
-        let _ = writeln!(
-            text,
-            "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\""
-        );
+        let _ = writeln!(text, "\n[[lumped_mass]]\nname = \"{name}\"\nmass = \"{mass}\"");
         // A mass at one point is complete and needs no share.
         if *shares > 1 {
             let _ = writeln!(text, "share = \"1/{shares}\"");
@@ -127,10 +116,7 @@ fn masses(text: &mut String, draft: &PlanarDraft) {
 /// Tables `[[loop]]`, `[[drive]]` and `[[effect]]`.
 fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
     for (name, [one, two]) in &draft.loops {
-        let _ = writeln!(
-            text,
-            "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]"
-        );
+        let _ = writeln!(text, "\n[[loop]]\nname = \"{name}\"\njoins = [\"{one}\", \"{two}\"]");
     }
     // A drive moves a coordinate, or acts between two points.
     for (name, moves) in &draft.drives {
@@ -157,17 +143,9 @@ fn loops_and_drives(text: &mut String, draft: &PlanarDraft) {
             entries.join(", ")
         };
         let nominal = |number: &str| format!("{{ nominal = {number} }}");
-        let _ = writeln!(
-            text,
-            "parameters = {{ {} }}",
-            list(&effect.parameters, nominal)
-        );
+        let _ = writeln!(text, "parameters = {{ {} }}", list(&effect.parameters, nominal));
         if !effect.constants.is_empty() {
-            let _ = writeln!(
-                text,
-                "constants = {{ {} }}",
-                list(&effect.constants, str::to_owned)
-            );
+            let _ = writeln!(text, "constants = {{ {} }}", list(&effect.constants, str::to_owned));
         }
     }
 }

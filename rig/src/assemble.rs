@@ -7,8 +7,8 @@ use crate::assemble_sensors::channels;
 use crate::effect::RigEffect;
 use crate::effect_by_name::EffectPart;
 use crate::file::{
-    BodyEntry, LengthEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry,
-    RigJointEntry, RigLumpedMassEntry, RigName,
+    BodyEntry, LengthEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry, RigJointEntry,
+    RigLumpedMassEntry, RigName,
 };
 use crate::joint;
 use crate::load::source_span;
@@ -122,10 +122,7 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     // One drive per degree of freedom; the error is placed at the last entry.
     if n_coordinates == 0 || n_drives != n_coordinates {
         let drives = merged.drives.last().map(|d| (d.file, d.entry.name.span()));
-        let last = drives.or(merged
-            .coordinates
-            .last()
-            .map(|c| (c.file, c.entry.name.span())));
+        let last = drives.or(merged.coordinates.last().map(|c| (c.file, c.entry.name.span())));
         let (file, range) = last.unwrap_or((0, 0..0));
         log.error(
             source_span(file, &range),
@@ -136,17 +133,10 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
     }
     // Columns of a recording: time, each coordinate with its derivatives, and each drive.
     let mut columns = vec!["t".to_owned()];
-    let coordinates = merged
-        .coordinates
-        .iter()
-        .map(|c| (c.file, &c.entry.name, true));
+    let coordinates = merged.coordinates.iter().map(|c| (c.file, &c.entry.name, true));
     let drives = merged.drives.iter().map(|d| (d.file, &d.entry.name, false));
     for (file, name, is_coordinate) in coordinates.chain(drives) {
-        let suffixes: &[&str] = if is_coordinate {
-            &["", "_d", "_dd"]
-        } else {
-            &[""]
-        };
+        let suffixes: &[&str] = if is_coordinate { &["", "_d", "_dd"] } else { &[""] };
         for suffix in suffixes {
             let column = format!("{}{suffix}", name.get_ref());
             if columns.contains(&column) {
@@ -165,32 +155,29 @@ fn check_columns(merged: &MergedRig, log: &mut RigLog) {
 /// A body; its inertia must be physically possible.
 fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
     let (file, entry) = (item.file, &item.entry);
-    let inertia = entry
-        .inertia
-        .as_ref()
-        .map_or_else(Matrix3::zeros, |spanned| {
-            let i = spanned.get_ref();
-            let matrix = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
-            // Eigenvalues are computed for finite entries only.
-            let moments = if matrix.iter().all(|x| x.is_finite()) {
-                matrix.symmetric_eigenvalues()
-            } else {
-                Vector3::repeat(f64::NAN)
-            };
-            // A planar model has zz alone, which no real body has; this is accepted where only zz has an effect.
-            if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
-                log.error(
-                    source_span(file, &spanned.span()),
-                    format!(
-                        "this inertia is not physically possible: its principal moments are {:.4}, {:.4}, {:.4}",
-                        moments[0], moments[1], moments[2]
-                    ),
-                    "expected principal moments that are not below zero",
-                    "xy, xz and yz are the entries of the matrix: the negative products of inertia",
-                );
-            }
-            matrix
-        });
+    let inertia = entry.inertia.as_ref().map_or_else(Matrix3::zeros, |spanned| {
+        let i = spanned.get_ref();
+        let matrix = Matrix3::new(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz);
+        // Eigenvalues are computed for finite entries only.
+        let moments = if matrix.iter().all(|x| x.is_finite()) {
+            matrix.symmetric_eigenvalues()
+        } else {
+            Vector3::repeat(f64::NAN)
+        };
+        // A planar model has zz alone, which no real body has; this is accepted where only zz has an effect.
+        if moments.min().is_nan() || moments.min() < -1e-9 * moments.amax() {
+            log.error(
+                source_span(file, &spanned.span()),
+                format!(
+                    "this inertia is not physically possible: its principal moments are {:.4}, {:.4}, {:.4}",
+                    moments[0], moments[1], moments[2]
+                ),
+                "expected principal moments that are not below zero",
+                "xy, xz and yz are the entries of the matrix: the negative products of inertia",
+            );
+        }
+        matrix
+    });
     // Without `at` and `rpy` the body's frame is the base frame in the nominal configuration.
     RigBody {
         name: entry.name.get_ref().clone(),
@@ -208,19 +195,11 @@ fn body(item: &FileItem<BodyEntry>, log: &mut RigLog) -> RigBody {
 struct UnknownBody;
 
 /// Index of a body; `None` is the base.
-fn find_body(
-    rig: &Rig,
-    file: usize,
-    name: &RigName,
-    log: &mut RigLog,
-) -> Result<Option<usize>, UnknownBody> {
+fn find_body(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Result<Option<usize>, UnknownBody> {
     if name.get_ref() == "base" {
         return Ok(None);
     }
-    let found = rig
-        .bodies
-        .iter()
-        .position(|body| &body.name == name.get_ref());
+    let found = rig.bodies.iter().position(|body| &body.name == name.get_ref());
     if found.is_none() {
         let mut known = vec!["base"];
         known.extend(rig.bodies.iter().map(|body| body.name.as_str()));
@@ -231,10 +210,7 @@ fn find_body(
 
 /// The place of a named point; reports an unknown name.
 fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<BodyAnchor> {
-    let found = rig
-        .points
-        .iter()
-        .find(|point| &point.name == name.get_ref());
+    let found = rig.points.iter().find(|point| &point.name == name.get_ref());
     if found.is_none() {
         let known: Vec<&str> = rig.points.iter().map(|point| point.name.as_str()).collect();
         log.unknown_name(file, name, "point", &known);
@@ -244,10 +220,7 @@ fn find_point(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
 
 /// Index of a joint with exactly one coordinate; reports any other.
 fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Option<usize> {
-    let found = rig
-        .joints
-        .iter()
-        .position(|joint| &joint.name == name.get_ref());
+    let found = rig.joints.iter().position(|joint| &joint.name == name.get_ref());
     match found {
         None => {
             let known: Vec<&str> = rig.joints.iter().map(|joint| joint.name.as_str()).collect();
@@ -257,10 +230,7 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
         Some(at) if rig.joints[at].motion.is_none() => {
             log.error(
                 source_span(file, &name.span()),
-                format!(
-                    "the joint `{}` does not have exactly one coordinate",
-                    name.get_ref()
-                ),
+                format!("the joint `{}` does not have exactly one coordinate", name.get_ref()),
                 "expected a revolute or a prismatic joint",
                 "",
             );
@@ -271,11 +241,7 @@ fn find_joint(rig: &Rig, file: usize, name: &RigName, log: &mut RigLog) -> Optio
 }
 
 /// A lumped mass, whose two points must be on one body.
-fn lumped_mass(
-    rig: &Rig,
-    item: &FileItem<RigLumpedMassEntry>,
-    log: &mut RigLog,
-) -> Option<RigLumpedMass> {
+fn lumped_mass(rig: &Rig, item: &FileItem<RigLumpedMassEntry>, log: &mut RigLog) -> Option<RigLumpedMass> {
     let (file, entry) = (item.file, &item.entry);
     let mass = not_negative(file, Some(&entry.mass), "a mass", log);
     let at = find_point(rig, file, &entry.at, log)?;
@@ -284,18 +250,10 @@ fn lumped_mass(
         Some(name) => find_point(rig, file, name, log)?,
     };
     // The moment of a lumped mass may act at another point, but only on the same body.
-    if let Some(name) = entry
-        .moment_at
-        .as_ref()
-        .filter(|_| moment_at.body != at.body)
-    {
+    if let Some(name) = entry.moment_at.as_ref().filter(|_| moment_at.body != at.body) {
         log.error(
             source_span(file, &name.span()),
-            format!(
-                "`{}` is on another body than `{}`",
-                name.get_ref(),
-                entry.at.get_ref()
-            ),
+            format!("`{}` is on another body than `{}`", name.get_ref(), entry.at.get_ref()),
             "expected a point of the same body",
             "the mass belongs to one body, in the balance of forces and in the balance of moments",
         );
@@ -317,19 +275,11 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
     };
     // Each error returns the joint without equations, so that its name still exists.
     let Some(kind) = joint::RigJointKind::from_name(entry.kind.get_ref()) else {
-        log.unknown_name(
-            file,
-            &entry.kind,
-            "kind of joint",
-            &joint::RigJointKind::NAMES,
-        );
+        log.unknown_name(file, &entry.kind, "kind of joint", &joint::RigJointKind::NAMES);
         return joint;
     };
     let [one, two] = entry.between.get_ref();
-    let bodies = (
-        find_body(rig, file, one, log),
-        find_body(rig, file, two, log),
-    );
+    let bodies = (find_body(rig, file, one, log), find_body(rig, file, two, log));
     // Without `axis` the joint's axis is z of the base frame.
     let axis = entry
         .axis
@@ -362,15 +312,8 @@ fn joint(rig: &Rig, item: &FileItem<RigJointEntry>, log: &mut RigLog) -> RigJoin
         return joint;
     };
     // Directions of the equations are those of the nominal configuration, in the frames of both bodies.
-    let nominal =
-        |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
-    let parts = joint::equations(
-        kind,
-        from,
-        to,
-        &axis.normalize(),
-        [nominal(first), nominal(second)],
-    );
+    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
+    let parts = joint::equations(kind, from, to, &axis.normalize(), [nominal(first), nominal(second)]);
     joint.equations = parts.0;
     joint.motion = parts.1;
     joint
@@ -385,8 +328,7 @@ fn joint_anchors(
     log: &mut RigLog,
 ) -> Option<[BodyAnchor; 2]> {
     // A place in the base frame becomes a place in the frame of a body, both in the nominal configuration.
-    let nominal =
-        |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
+    let nominal = |body: Option<usize>| body.map_or_else(BodyPose::identity, |b| rig.bodies[b].nominal);
     let on = |body: Option<usize>, p_W: Vector3<f64>| {
         let pose = nominal(body);
         BodyAnchor {
@@ -415,13 +357,7 @@ fn joint_anchors(
                 [one] if bodies.contains(&one.body) => {
                     let pose = nominal(one.body);
                     let p_W = pose.q_WB * one.at + pose.p_WB_W;
-                    Some(bodies.map(|body| {
-                        if body == one.body {
-                            *one
-                        } else {
-                            on(body, p_W)
-                        }
-                    }))
+                    Some(bodies.map(|body| if body == one.body { *one } else { on(body, p_W) }))
                 }
                 [one, two] if [one.body, two.body] == bodies => Some([*one, *two]),
                 _ => {
@@ -503,11 +439,10 @@ fn coordinate(rig: &mut Rig, item: &FileItem<RigCoordinateEntry>, log: &mut RigL
             None
         }
     };
-    rig.coordinates
-        .extend(measures.map(|measures| RigCoordinate {
-            name: entry.name.get_ref().clone(),
-            measures,
-        }));
+    rig.coordinates.extend(measures.map(|measures| RigCoordinate {
+        name: entry.name.get_ref().clone(),
+        measures,
+    }));
 }
 
 /// Adds a drive.
@@ -515,9 +450,7 @@ fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
     let (file, entry) = (item.file, &item.entry);
     // A drive acts either in a joint or along the distance of two points.
     let measures = match (&entry.joint, &entry.linear) {
-        (Some(name), None) => {
-            find_joint(rig, file, name, log).and_then(|joint| rig.joints[joint].motion)
-        }
+        (Some(name), None) => find_joint(rig, file, name, log).and_then(|joint| rig.joints[joint].motion),
         (None, Some(points)) => length(rig, file, points, log),
         _ => {
             report_unclear_kind(file, &entry.name, "`joint` and `linear`", log);
@@ -534,10 +467,7 @@ fn drive(rig: &mut Rig, item: &FileItem<RigDriveEntry>, log: &mut RigLog) {
 fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog) {
     log.error(
         source_span(file, &name.span()),
-        format!(
-            "the definition of `{}` is missing, or stated twice",
-            name.get_ref()
-        ),
+        format!("the definition of `{}` is missing, or stated twice", name.get_ref()),
         &format!("expected exactly one of {keys}"),
         "",
     );
@@ -546,12 +476,7 @@ fn report_unclear_kind(file: usize, name: &RigName, keys: &str, log: &mut RigLog
 /// An effect; reports its errors at the places of the entry.
 fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Option<RigEffect> {
     let (file, entry) = (item.file, &item.entry);
-    let at: Vec<&str> = entry
-        .at
-        .get_ref()
-        .iter()
-        .map(|name| name.get_ref().as_str())
-        .collect();
+    let at: Vec<&str> = entry.at.get_ref().iter().map(|name| name.get_ref().as_str()).collect();
     let values: Vec<(&str, f64)> = entry
         .values
         .iter()
@@ -572,12 +497,7 @@ fn effect(rig: &Rig, item: &FileItem<RigEffectEntry>, log: &mut RigLog) -> Optio
                 named.map_or(entry.kind.span(), toml::Spanned::span)
             }
         };
-        log.error(
-            source_span(file, &range),
-            found.message,
-            &found.expected,
-            &found.help,
-        );
+        log.error(source_span(file, &range), found.message, &found.expected, &found.help);
     }
     None
 }

@@ -70,12 +70,7 @@ fn channel(item: &FileItem<SensorEntry>, what: &str, log: &mut RigLog) -> Sensor
             * above_zero(file, &current.resolution, "a resolution", log);
     }
     SensorChannel {
-        noise: not_negative(
-            file,
-            entry.noise.as_ref(),
-            "a standard deviation of noise",
-            log,
-        ),
+        noise: not_negative(file, entry.noise.as_ref(), "a standard deviation of noise", log),
         resolution,
         delay: not_negative(file, entry.delay.as_ref(), "a delay", log),
     }

@@ -65,15 +65,10 @@ pub(crate) fn drive_forces(
     let decomposed = FullPivLU::new(leverage);
     let pivots: DVector<f64> = decomposed.u().diagonal();
     let largest = pivots.amax();
-    if pivots
-        .iter()
-        .any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest)
-    {
+    if pivots.iter().any(|p| p.abs() <= LEVERAGE_TOLERANCE * largest) {
         return Err(RigPoseError::DrivesDeadlocked);
     }
-    let forces = decomposed
-        .solve(&needed)
-        .ok_or(RigPoseError::DrivesDeadlocked)?;
+    let forces = decomposed.solve(&needed).ok_or(RigPoseError::DrivesDeadlocked)?;
     Ok(forces.iter().copied().collect())
 }
 
@@ -104,8 +99,7 @@ pub fn energy(rig: &Rig, motion: &RigMotion) -> f64 {
     let mut sum = massive::energy(rig, motion, &gravity);
     for (body, moves) in rig.bodies.iter().zip(&motion.bodies) {
         let w = moves.R_WB.transpose() * moves.w_WB_W;
-        sum += 0.5 * body.mass * moves.point_velocity(&body.centre).norm_squared()
-            + 0.5 * w.dot(&(body.inertia * w))
+        sum += 0.5 * body.mass * moves.point_velocity(&body.centre).norm_squared() + 0.5 * w.dot(&(body.inertia * w))
             - body.mass * gravity.dot(&moves.point_position(&body.centre));
     }
     let base = base_motion();
@@ -140,14 +134,9 @@ fn body_forces(rig: &Rig, motion: &RigMotion) -> DVector<f64> {
     for lumped in &rig.lumped_masses {
         if let Some(b) = lumped.at.body {
             let moves = &motion.bodies[b];
-            let inertial =
-                |at: &Vector3<f64>| lumped.mass * (moves.point_acceleration(at) - gravity);
+            let inertial = |at: &Vector3<f64>| lumped.mass * (moves.point_acceleration(at) - gravity);
             let arm = moves.R_WB * lumped.moment_at;
-            add(
-                b,
-                inertial(&lumped.at.at),
-                arm.cross(&inertial(&lumped.moment_at)),
-            );
+            add(b, inertial(&lumped.at.at), arm.cross(&inertial(&lumped.moment_at)));
         }
     }
     for effect in &rig.effects {

@@ -254,34 +254,10 @@ impl RigLaw {
                     ]
                 }
             }
-            "coupled_drive" => {
-                const {
-                    &[
-                        zero_by_default("Ia"),
-                        zero_by_default("Fv"),
-                        zero_by_default("Fs"),
-                    ]
-                }
-            }
-            "rod_inertia" => {
-                const {
-                    &[
-                        not_negative_value("m"),
-                        any_value("c"),
-                        not_negative_value("I"),
-                    ]
-                }
-            }
+            "coupled_drive" => const { &[zero_by_default("Ia"), zero_by_default("Fv"), zero_by_default("Fs")] },
+            "rod_inertia" => const { &[not_negative_value("m"), any_value("c"), not_negative_value("I")] },
             "point_mass" | "lumped_mass_placement" => const { &[any_value("m")] },
-            "gravity_tilt" => {
-                const {
-                    &[
-                        zero_by_default("tx"),
-                        zero_by_default("ty"),
-                        zero_by_default("tz"),
-                    ]
-                }
-            }
+            "gravity_tilt" => const { &[zero_by_default("tx"), zero_by_default("ty"), zero_by_default("tz")] },
             "time_delay" => const { &[not_negative_value("T")] },
             _ => return None,
         })
@@ -295,12 +271,8 @@ impl RigLaw {
             ("coulomb_friction", &[Fc]) => Self::CoulombFriction { Fc },
             ("stribeck_friction", &[Fs, vs]) => Self::StribeckFriction { Fs, vs },
             ("quadratic_friction", &[Fq]) => Self::QuadraticFriction { Fq },
-            ("directional_viscous_friction", &[Fvp, Fvn]) => {
-                Self::DirectionalViscousFriction { Fvp, Fvn }
-            }
-            ("directional_coulomb_friction", &[Fcp, Fcn]) => {
-                Self::DirectionalCoulombFriction { Fcp, Fcn }
-            }
+            ("directional_viscous_friction", &[Fvp, Fvn]) => Self::DirectionalViscousFriction { Fvp, Fvn },
+            ("directional_coulomb_friction", &[Fcp, Fcn]) => Self::DirectionalCoulombFriction { Fcp, Fcn },
             ("load_friction", &[mu]) => Self::LoadFriction { mu },
             ("drive_inertia", &[Ia]) => Self::DriveInertia { Ia },
             ("force_offset", &[F0]) => Self::ForceOffset { F0 },
@@ -323,12 +295,8 @@ impl RigLaw {
             Self::CoulombFriction { Fc } => ("coulomb_friction", vec![Fc]),
             Self::StribeckFriction { Fs, vs } => ("stribeck_friction", vec![Fs, vs]),
             Self::QuadraticFriction { Fq } => ("quadratic_friction", vec![Fq]),
-            Self::DirectionalViscousFriction { Fvp, Fvn } => {
-                ("directional_viscous_friction", vec![Fvp, Fvn])
-            }
-            Self::DirectionalCoulombFriction { Fcp, Fcn } => {
-                ("directional_coulomb_friction", vec![Fcp, Fcn])
-            }
+            Self::DirectionalViscousFriction { Fvp, Fvn } => ("directional_viscous_friction", vec![Fvp, Fvn]),
+            Self::DirectionalCoulombFriction { Fcp, Fcn } => ("directional_coulomb_friction", vec![Fcp, Fcn]),
             Self::LoadFriction { mu } => ("load_friction", vec![mu]),
             Self::DriveInertia { Ia } => ("drive_inertia", vec![Ia]),
             Self::ForceOffset { F0 } => ("force_offset", vec![F0]),
@@ -341,10 +309,7 @@ impl RigLaw {
             Self::GravityTilt { tx, ty, tz } => ("gravity_tilt", vec![tx, ty, tz]),
             Self::TimeDelay { T } => ("time_delay", vec![T]),
         };
-        let symbols = Self::values(kind)
-            .unwrap_or(&[])
-            .iter()
-            .map(|value| value.symbol);
+        let symbols = Self::values(kind).unwrap_or(&[]).iter().map(|value| value.symbol);
         (kind, symbols.zip(values).collect())
     }
 
@@ -360,13 +325,9 @@ impl RigLaw {
                 Fs * way * libm::exp(-share * share)
             }
             Self::QuadraticFriction { Fq } => Fq * at.rate * at.rate.abs(),
-            Self::DirectionalViscousFriction { Fvp, Fvn } => {
-                at.rate * if at.rate > 0.0 { Fvp } else { Fvn }
-            }
+            Self::DirectionalViscousFriction { Fvp, Fvn } => at.rate * if at.rate > 0.0 { Fvp } else { Fvn },
             // At standstill the mean of both values, as in the library's expression.
-            Self::DirectionalCoulombFriction { Fcp, Fcn } => {
-                0.5 * (Fcp * (1.0 + way) - Fcn * (1.0 - way))
-            }
+            Self::DirectionalCoulombFriction { Fcp, Fcn } => 0.5 * (Fcp * (1.0 + way) - Fcn * (1.0 - way)),
             Self::LoadFriction { mu } => mu * load.abs() * way,
             Self::DriveInertia { Ia } => Ia * at.acceleration,
             Self::ForceOffset { F0 } => F0,
@@ -397,11 +358,7 @@ impl RigEffect {
     ) -> Vec<(RigPlace, f64)> {
         let n = self.places.len();
         let acts = |place: &RigPlace| matches!(place, RigPlace::Drive(_) | RigPlace::Joint(_));
-        let places = self
-            .places
-            .iter()
-            .enumerate()
-            .filter(|(_, place)| acts(place));
+        let places = self.places.iter().enumerate().filter(|(_, place)| acts(place));
         places
             .map(|(i, place)| {
                 let other = measured(self.places[(i + 1) % n]);

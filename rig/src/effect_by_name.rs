@@ -126,12 +126,7 @@ impl Rig {
     /// assert!((force - (2.0 * 3.0 + 20.0 * 0.1)).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn effect(
-        &self,
-        kind: &str,
-        at: &[&str],
-        values: &[(&str, f64)],
-    ) -> Result<RigEffect, Vec<EffectFault>> {
+    pub fn effect(&self, kind: &str, at: &[&str], values: &[(&str, f64)]) -> Result<RigEffect, Vec<EffectFault>> {
         let Some(known) = RigLaw::values(kind) else {
             return Err(vec![EffectFault {
                 part: EffectPart::Kind,
@@ -161,9 +156,7 @@ impl Rig {
                 }
                 (Some(x), _) if !x.is_finite() => Some("a finite number"),
                 (Some(x), ValueSign::Positive) if x <= 0.0 => Some("a number above zero"),
-                (Some(x), ValueSign::NotNegative) if x < 0.0 => {
-                    Some("a number that is not below zero")
-                }
+                (Some(x), ValueSign::NotNegative) if x < 0.0 => Some("a number that is not below zero"),
                 _ => None,
             };
             if let Some(says) = says {
@@ -182,10 +175,7 @@ impl Rig {
         }
         // Symbols that the kind does not have.
         let symbols: Vec<&str> = known.iter().map(|value| value.symbol).collect();
-        for (symbol, _) in values
-            .iter()
-            .filter(|(symbol, _)| !symbols.contains(symbol))
-        {
+        for (symbol, _) in values.iter().filter(|(symbol, _)| !symbols.contains(symbol)) {
             faults.push(EffectFault {
                 part: EffectPart::Value((*symbol).to_owned()),
                 message: format!("there is no value `{symbol}` of `{kind}`"),
@@ -239,11 +229,7 @@ impl Rig {
     /// The place of a name among the allowed ones.
     fn place(&self, acts: AllowedPlaces, name: &str) -> Option<RigPlace> {
         // The joint that a coordinate measures.
-        let joint = |pair: &PairFunction| {
-            self.joints
-                .iter()
-                .position(|j| j.motion.as_ref() == Some(pair))
-        };
+        let joint = |pair: &PairFunction| self.joints.iter().position(|j| j.motion.as_ref() == Some(pair));
         let drive = || self.drives.iter().position(|drive| drive.name == name);
         match acts {
             AllowedPlaces::Drives => drive().map(RigPlace::Drive),
@@ -252,27 +238,16 @@ impl Rig {
                 .map(RigPlace::Drive),
             AllowedPlaces::DrivesAndJoints | AllowedPlaces::TwoDrivesOrJoints => {
                 let coordinate = || self.coordinates.iter().find(|c| c.name == name);
-                let named = || {
-                    self.joints
-                        .iter()
-                        .position(|j| j.name == name && j.motion.is_some())
-                };
+                let named = || self.joints.iter().position(|j| j.name == name && j.motion.is_some());
                 // Drives come first, then the joints of coordinates, then joints by their own names.
                 drive()
                     .map(RigPlace::Drive)
-                    .or_else(|| {
-                        coordinate()
-                            .and_then(|c| joint(&c.measures))
-                            .map(RigPlace::Joint)
-                    })
+                    .or_else(|| coordinate().and_then(|c| joint(&c.measures)).map(RigPlace::Joint))
                     .or_else(|| named().map(RigPlace::Joint))
             }
             AllowedPlaces::Points | AllowedPlaces::TwoPointsOfABody => {
                 let point = self.points.iter().position(|point| point.name == name)?;
-                self.points[point]
-                    .anchor
-                    .body
-                    .map(|_| RigPlace::Point(point))
+                self.points[point].anchor.body.map(|_| RigPlace::Point(point))
             }
             AllowedPlaces::Base => (name == "base").then_some(RigPlace::Base),
             AllowedPlaces::Force => (name == "force").then_some(RigPlace::Force),
@@ -301,11 +276,7 @@ impl Rig {
 
 /// A list of names for a message, at most 24 of them.
 pub(crate) fn name_list(names: &[&str]) -> String {
-    let mut list: Vec<String> = names
-        .iter()
-        .take(24)
-        .map(|name| format!("`{name}`"))
-        .collect();
+    let mut list: Vec<String> = names.iter().take(24).map(|name| format!("`{name}`")).collect();
     if names.len() > 24 {
         list.push("...".to_owned());
     }

@@ -71,17 +71,13 @@ pub(crate) fn equations(
     let on = |side: usize, direction: &Vector3<f64>| poses[side].q_WB.inverse() * direction;
     let pair = |shape| PairFunction { from, to, shape };
     // The two places coincide.
-    let coincident =
-        || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
+    let coincident = || [Vector3::x(), Vector3::y(), Vector3::z()].map(|n| pair(PairQuantity::Component(n)));
     // The place on the second body is on the axis of the first.
     let on_line = || [&u, &v].map(|n| pair(PairQuantity::Along(on(0, n))));
     // The axes of both bodies are parallel.
     let parallel = || [&u, &v].map(|n| pair(PairQuantity::Cosine(on(0, n), on(1, axis))));
     // The bodies do not rotate relative to each other: three pairs of perpendicular directions.
-    let locked = || {
-        [(&u, &v), (&v, axis), (axis, &u)]
-            .map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))))
-    };
+    let locked = || [(&u, &v), (&v, axis), (axis, &u)].map(|(a, b)| pair(PairQuantity::Cosine(on(0, a), on(1, b))));
     let mut held: Vec<PairFunction> = Vec::new();
     let mut motion = None;
     match kind {
@@ -120,10 +116,7 @@ pub(crate) fn equations(
 
 /// Sets the value that a joint's coordinate has while the bodies are at `poses`.
 pub(crate) fn set_nominal(motion: &mut PairFunction, nominal: f64, poses: &[BodyPose]) {
-    let bodies: Vec<BodyMotion> = poses
-        .iter()
-        .map(|pose| BodyMotion::at_standstill(*pose))
-        .collect();
+    let bodies: Vec<BodyMotion> = poses.iter().map(|pose| BodyMotion::at_standstill(*pose)).collect();
     let base = BodyMotion::at_standstill(BodyPose::identity());
     let value = motion.derive(&bodies, &base).value;
     match &mut motion.shape {

@@ -84,18 +84,12 @@ impl fmt::Display for RigPoseError {
                 "joints and coordinates do not determine the motion: `{body}` is free to move; avoid singular poses, \
                  or fix it with a joint"
             ),
-            Self::TooManyCoordinates {
-                freedoms,
-                coordinates,
-            } => write!(
+            Self::TooManyCoordinates { freedoms, coordinates } => write!(
                 f,
                 "the joints leave fewer degrees of freedom ({freedoms}) than there are coordinates ({coordinates}); give as \
                  many coordinates and drives as there are degrees of freedom"
             ),
-            Self::DrivesDeadlocked => write!(
-                f,
-                "the drives cannot balance a load at this pose; avoid this pose"
-            ),
+            Self::DrivesDeadlocked => write!(f, "the drives cannot balance a load at this pose; avoid this pose"),
         }
     }
 }
@@ -141,13 +135,9 @@ impl<'r> RigTracker<'r> {
     pub fn new(rig: &'r Rig) -> Result<Self, RigPoseError> {
         let base = BodyMotion::at_standstill(BodyPose::identity());
         let poses: Vec<BodyPose> = rig.bodies.iter().map(|body| body.nominal).collect();
-        let at_rest: Vec<BodyMotion> = poses
-            .iter()
-            .map(|p| BodyMotion::at_standstill(*p))
-            .collect();
+        let at_rest: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let joints = rig.joints.iter();
-        let mut equations: Vec<(PairFunction, f64)> =
-            joints.clone().flat_map(|j| j.equations.clone()).collect();
+        let mut equations: Vec<(PairFunction, f64)> = joints.clone().flat_map(|j| j.equations.clone()).collect();
         let mut names: Vec<&str> = joints
             .flat_map(|j| j.equations.iter().map(|_| j.name.as_str()))
             .collect();
@@ -181,11 +171,7 @@ impl<'r> RigTracker<'r> {
         let n = 6 * self.rig.bodies.len();
         let coordinates = self.last.len();
         let n_joint = self.equations.len() - coordinates;
-        let bodies: Vec<BodyMotion> = self
-            .poses
-            .iter()
-            .map(|p| BodyMotion::at_standstill(*p))
-            .collect();
+        let bodies: Vec<BodyMotion> = self.poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
         let mut jacobian: DMatrix<f64> = DMatrix::zeros(n_joint.max(n), n);
         for (i, (pair, _)) in self.equations[..n_joint].iter().enumerate() {
             let derived = pair.derive(&bodies, &self.base);
@@ -195,10 +181,7 @@ impl<'r> RigTracker<'r> {
         let held = (0..n).filter(|i| r[(*i, *i)].abs() > RANK_TOLERANCE * r[(0, 0)].abs());
         let freedoms = n - held.count();
         if coordinates > freedoms {
-            return Err(RigPoseError::TooManyCoordinates {
-                freedoms,
-                coordinates,
-            });
+            return Err(RigPoseError::TooManyCoordinates { freedoms, coordinates });
         }
         Ok(())
     }
@@ -218,11 +201,7 @@ impl<'r> RigTracker<'r> {
             .iter()
             .zip(&self.last)
             .enumerate()
-            .map(|(k, (to, from))| {
-                self.rig.coordinates[k]
-                    .measures
-                    .wrapped_difference(*to, *from)
-            })
+            .map(|(k, (to, from))| self.rig.coordinates[k].measures.wrapped_difference(*to, *from))
             .fold(0.0, |most: f64, step| most.max(step.abs()));
         // Small steps stay in the assembly mode of the nominal configuration.
         let n_steps = (far / CONTINUATION_STEP).min(1e4).ceil();
@@ -234,9 +213,7 @@ impl<'r> RigTracker<'r> {
                 .zip(&state.q)
                 .enumerate()
                 .map(|(k, (from, to))| {
-                    let whole = self.rig.coordinates[k]
-                        .measures
-                        .wrapped_difference(*to, *from);
+                    let whole = self.rig.coordinates[k].measures.wrapped_difference(*to, *from);
                     from + whole * step / n_steps
                 })
                 .collect();
@@ -264,10 +241,7 @@ impl<'r> RigTracker<'r> {
         let mut last_length = f64::INFINITY;
         let mut is_fresh = false;
         for _ in 0..MOST_STEPS {
-            let bodies: Vec<BodyMotion> = poses
-                .iter()
-                .map(|p| BodyMotion::at_standstill(*p))
-                .collect();
+            let bodies: Vec<BodyMotion> = poses.iter().map(|p| BodyMotion::at_standstill(*p)).collect();
             let derived = self.derive(&bodies);
             let mut residual = DMatrix::zeros(self.equations.len(), 1);
             for (i, ((pair, target), derived)) in self.equations.iter().zip(&derived).enumerate() {
@@ -275,12 +249,8 @@ impl<'r> RigTracker<'r> {
             }
             let gap = residual.iamax_full().0;
             outcome = (self.names[gap], residual[gap].abs());
-            let known = self
-                .inverse
-                .as_ref()
-                .map(|inverse| inverse.solve(&residual));
-            let shrinks =
-                |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
+            let known = self.inverse.as_ref().map(|inverse| inverse.solve(&residual));
+            let shrinks = |step: &DMatrix<f64>| step.amax() < SMALLEST_STEP.max(SLOWEST * last_length);
             let mut step = if let Some(step) = known.filter(shrinks) {
                 step
             } else {
@@ -348,11 +318,7 @@ impl<'r> RigTracker<'r> {
         let n_equations = self.equations.len();
         let n_dof = state.q.len();
         let n_joint = n_equations - n_dof;
-        let mut bodies: Vec<BodyMotion> = self
-            .poses
-            .iter()
-            .map(|pose| BodyMotion::at_standstill(*pose))
-            .collect();
+        let mut bodies: Vec<BodyMotion> = self.poses.iter().map(|pose| BodyMotion::at_standstill(*pose)).collect();
         let derived = self.derive(&bodies);
         // Unit rate of each coordinate, with the joints' equations constant.
         let mut unit = DMatrix::zeros(n_equations, n_dof);
@@ -369,11 +335,7 @@ impl<'r> RigTracker<'r> {
         // Accelerations: the joints' second derivatives are zero, and the coordinates' ones are prescribed.
         let mut right = DMatrix::zeros(n_equations, 1);
         for (i, derived) in self.derive(&bodies).iter().enumerate() {
-            let prescribed = if i < n_joint {
-                0.0
-            } else {
-                state.qdd[i - n_joint]
-            };
+            let prescribed = if i < n_joint { 0.0 } else { state.qdd[i - n_joint] };
             right[i] = prescribed - derived.bias;
         }
         let accelerations = self.solve(&derived, &right)?;
@@ -389,11 +351,7 @@ impl<'r> RigTracker<'r> {
 
     /// Solves `gradient x = right` by iterative refinement with the present inverse; with a new one if that converges
     /// slowly.
-    fn solve(
-        &mut self,
-        derived: &[PairDerivatives],
-        right: &DMatrix<f64>,
-    ) -> Result<DMatrix<f64>, RigPoseError> {
+    fn solve(&mut self, derived: &[PairDerivatives], right: &DMatrix<f64>) -> Result<DMatrix<f64>, RigPoseError> {
         let scale = right.amax().max(f64::MIN_POSITIVE);
         if let Some(inverse) = &self.inverse {
             let mut x = inverse.solve(right);

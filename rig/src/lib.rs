@@ -11,10 +11,7 @@
 //! 5. [`simulate`] - the readings of the sensors.
 //!
 //! A [`RigPlant`] is the forward dynamics, for controllers: forces of the drives go in, motion comes out.
-#![allow(
-    non_snake_case,
-    reason = "physical quantities carry their frames, as in p_WB_W"
-)]
+#![allow(non_snake_case, reason = "physical quantities carry their frames, as in p_WB_W")]
 
 mod assemble;
 mod assemble_sensors;
@@ -51,7 +48,6 @@ pub use pose::{BodyMotion, BodyPose};
 pub use rig::{Rig, RigBody, RigCoordinate, RigDrive, RigJoint, RigLumpedMass, RigPoint};
 pub use sensor::{RigSensors, SensorChannel};
 pub use simulate::{
-    RigRecording, SimulatedInstant, SimulationError, forces, forces_along, n_instants,
-    place_motion, simulate,
+    RigRecording, SimulatedInstant, SimulationError, forces, forces_along, n_instants, place_motion, simulate,
 };
 pub use trajectory::{CoordinateSamples, Trajectory, TrajectoryError};

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use modelmill_boundary::files::{DiskFiles, FileSource, normalise_path};
 use modelmill_spec::{
-    Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan,
-    read_referenced, read_text,
+    Diagnostic, DiagnosticSeverity, LARGEST_FILE, LoadFailure, SourceFile, SourceFiles, SourceSpan, read_referenced,
+    read_text,
 };
 
 use crate::assemble::assemble;
@@ -107,25 +107,16 @@ pub fn load(path_name: &str, text: &str, files: &dyn FileSource) -> Result<Loade
     }
     match assemble(chain) {
         Ok(rig) => Ok(LoadedRig { rig, sources }),
-        Err(diagnostics) => Err(LoadFailure {
-            diagnostics,
-            sources,
-        }),
+        Err(diagnostics) => Err(LoadFailure { diagnostics, sources }),
     }
 }
 
 /// Reads the tables of a TOML file; `file` is its index among the sources.
 ///
 /// Fails with the place of the first entry that does not have the expected form.
-pub fn parse<T: serde::de::DeserializeOwned>(
-    text: &str,
-    file: usize,
-) -> Result<T, Box<Diagnostic>> {
+pub fn parse<T: serde::de::DeserializeOwned>(text: &str, file: usize) -> Result<T, Box<Diagnostic>> {
     if text.len() > LARGEST_FILE {
-        return Err(Box::new(plain_error(
-            None,
-            "this file is too large to be read",
-        )));
+        return Err(Box::new(plain_error(None, "this file is too large to be read")));
     }
     toml::from_str(text).map_err(|error| {
         let place = error.span().map(|range| source_span(file, &range));

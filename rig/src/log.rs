@@ -27,10 +27,7 @@ impl RigLog {
         let help = Message::from(help);
         self.0.push(Diagnostic {
             label: label.to_owned(),
-            help: Some(help)
-                .filter(|help| !help.is_empty())
-                .into_iter()
-                .collect(),
+            help: Some(help).filter(|help| !help.is_empty()).into_iter().collect(),
             ..plain_error(Some(span), message)
         });
     }
@@ -66,12 +63,7 @@ pub(crate) fn vector(file: usize, entry: Option<&SpannedTriple>, log: &mut RigLo
 }
 
 /// A finite number above zero; 1 if the entry is anything else, which is an error. `what` names it in the error.
-pub(crate) fn above_zero(
-    file: usize,
-    entry: &toml::Spanned<f64>,
-    what: &str,
-    log: &mut RigLog,
-) -> f64 {
+pub(crate) fn above_zero(file: usize, entry: &toml::Spanned<f64>, what: &str, log: &mut RigLog) -> f64 {
     let value = *entry.get_ref();
     if value.is_finite() && value > 0.0 {
         return value;
@@ -86,12 +78,7 @@ pub(crate) fn above_zero(
 }
 
 /// A finite number of at least zero; 0 if the entry is missing, or anything else, which is an error.
-pub(crate) fn not_negative(
-    file: usize,
-    entry: Option<&toml::Spanned<f64>>,
-    what: &str,
-    log: &mut RigLog,
-) -> f64 {
+pub(crate) fn not_negative(file: usize, entry: Option<&toml::Spanned<f64>>, what: &str, log: &mut RigLog) -> f64 {
     let Some(entry) = entry else {
         return 0.0;
     };

@@ -50,11 +50,7 @@ pub(crate) fn inertial_forces(
     // A force at a place of a body acts on the body with its moment about the body's origin; the base takes any force.
     let mut push = |anchor: &BodyAnchor, force: Vector3<f64>| {
         if let Some(body) = anchor.body {
-            add(
-                body,
-                force,
-                (motion.bodies[body].R_WB * anchor.at).cross(&force),
-            );
+            add(body, force, (motion.bodies[body].R_WB * anchor.at).cross(&force));
         }
     };
     match effect.law {
@@ -76,22 +72,15 @@ pub(crate) fn inertial_forces(
                 && let Some(body) = from.body
             {
                 let moves = &motion.bodies[body];
-                let moment = |at: &Vector3<f64>| {
-                    (moves.R_WB * at).cross(&(moves.point_acceleration(at) - gravity))
-                };
-                add(
-                    body,
-                    Vector3::zeros(),
-                    m * (moment(&to.at) - moment(&from.at)),
-                );
+                let moment = |at: &Vector3<f64>| (moves.R_WB * at).cross(&(moves.point_acceleration(at) - gravity));
+                add(body, Vector3::zeros(), m * (moment(&to.at) - moment(&from.at)));
             }
         }
         RigLaw::RodInertia { m, c, I } => {
             for place in &effect.places {
                 // A rod goes from the first point of a drive to the second.
                 if let Some(pair) = place.pair(rig) {
-                    let [pivot, slide] =
-                        rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
+                    let [pivot, slide] = rod_forces(motion, [&pair.from, &pair.to], m, c, I, gravity);
                     push(&pair.from, pivot);
                     push(&pair.to, slide);
                 }
@@ -142,9 +131,7 @@ fn rod_forces(
 
 /// The motion of the body that carries a place.
 fn anchor_motion(motion: &RigMotion, anchor: &BodyAnchor) -> BodyMotion {
-    anchor
-        .body
-        .map_or_else(base_motion, |body| motion.bodies[body])
+    anchor.body.map_or_else(base_motion, |body| motion.bodies[body])
 }
 
 /// The place of a point; `None` for other places and unknown indices.
@@ -174,18 +161,14 @@ pub(crate) fn energy(rig: &Rig, motion: &RigMotion, gravity: &Vector3<f64>) -> f
                     if let Some(pair) = place.pair(rig) {
                         let [one, two] = [&pair.from, &pair.to].map(|anchor| {
                             let moves = anchor_motion(motion, anchor);
-                            [
-                                moves.point_position(&anchor.at),
-                                moves.point_velocity(&anchor.at),
-                            ]
+                            [moves.point_position(&anchor.at), moves.point_velocity(&anchor.at)]
                         });
                         // Direction of the rod and its rate.
                         let d = two[0] - one[0];
                         let u = d / d.norm();
                         let dd = two[1] - one[1];
                         let ud = (dd - u.dot(&dd) * u) / d.norm();
-                        sum += 0.5 * m * (one[1] + c * ud).norm_squared()
-                            + 0.5 * I * ud.norm_squared()
+                        sum += 0.5 * m * (one[1] + c * ud).norm_squared() + 0.5 * I * ud.norm_squared()
                             - m * gravity.dot(&(one[0] + c * u));
                     }
                 }

@@ -1,8 +1,8 @@
 //! Merges a rig file and those that it extends: entries of a variant replace those of the same name or are added.
 
 use crate::file::{
-    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry, RigJointEntry,
-    RigLumpedMassEntry, RigName, RigPointEntry, SensorEntry, SpannedTriple,
+    BodyEntry, RigCoordinateEntry, RigDriveEntry, RigEffectEntry, RigEntry, RigJointEntry, RigLumpedMassEntry, RigName,
+    RigPointEntry, SensorEntry, SpannedTriple,
 };
 use crate::load::source_span;
 use crate::log::{FileItem, RigLog};
@@ -47,10 +47,7 @@ impl MergedRig {
         if *entry.schema.get_ref() != 1 {
             log.error(
                 source_span(file, &entry.schema.span()),
-                format!(
-                    "schema {} of rig files is not known",
-                    entry.schema.get_ref()
-                ),
+                format!("schema {} of rig files is not known", entry.schema.get_ref()),
                 "expected 1",
                 "write `schema = 1`",
             );
@@ -65,21 +62,9 @@ impl MergedRig {
             derivatives: sampling.derivatives,
             bodies: collect_items(file, entry.body, "body", |e| Some(&e.name), log),
             points: collect_items(file, entry.point, "point", |e| Some(&e.name), log),
-            lumped_masses: collect_items(
-                file,
-                entry.lumped_mass,
-                "lumped mass",
-                |e| e.name.as_ref(),
-                log,
-            ),
+            lumped_masses: collect_items(file, entry.lumped_mass, "lumped mass", |e| e.name.as_ref(), log),
             joints: collect_items(file, entry.joint, "joint", |e| Some(&e.name), log),
-            coordinates: collect_items(
-                file,
-                entry.coordinate,
-                "coordinate",
-                |e| Some(&e.name),
-                log,
-            ),
+            coordinates: collect_items(file, entry.coordinate, "coordinate", |e| Some(&e.name), log),
             drives: collect_items(file, entry.drive, "drive", |e| Some(&e.name), log),
             effects: collect_items(file, entry.effect, "effect", |e| e.name.as_ref(), log),
             // Sensors have no names of their own: a later one replaces an earlier one when channels are assembled.
@@ -101,13 +86,9 @@ impl MergedRig {
         self.derivatives = variant.derivatives.or(self.derivatives);
         merge_items(&mut self.bodies, variant.bodies, |e| Some(&e.name));
         merge_items(&mut self.points, variant.points, |e| Some(&e.name));
-        merge_items(&mut self.lumped_masses, variant.lumped_masses, |e| {
-            e.name.as_ref()
-        });
+        merge_items(&mut self.lumped_masses, variant.lumped_masses, |e| e.name.as_ref());
         merge_items(&mut self.joints, variant.joints, |e| Some(&e.name));
-        merge_items(&mut self.coordinates, variant.coordinates, |e| {
-            Some(&e.name)
-        });
+        merge_items(&mut self.coordinates, variant.coordinates, |e| Some(&e.name));
         merge_items(&mut self.drives, variant.drives, |e| Some(&e.name));
         merge_items(&mut self.effects, variant.effects, |e| e.name.as_ref());
         // Sensors are appended; the last one for a coordinate or a drive counts.
@@ -133,10 +114,7 @@ fn collect_items<T>(
         if !is_word || text == "base" {
             log.error(
                 source_span(file, &found.span()),
-                format!(
-                    "`{}` cannot be a name",
-                    text.chars().take(60).collect::<String>()
-                ),
+                format!("`{}` cannot be a name", text.chars().take(60).collect::<String>()),
                 "expected letters, digits and `_`, other than `base`",
                 "",
             );
@@ -151,24 +129,15 @@ fn collect_items<T>(
         }
         seen.push(text);
     }
-    entries
-        .into_iter()
-        .map(|entry| FileItem { file, entry })
-        .collect()
+    entries.into_iter().map(|entry| FileItem { file, entry }).collect()
 }
 
 /// Entries of a variant replace those of the same name at their place; the others are added.
-fn merge_items<T>(
-    base: &mut Vec<FileItem<T>>,
-    variant: Vec<FileItem<T>>,
-    name: impl Fn(&T) -> Option<&RigName>,
-) {
+fn merge_items<T>(base: &mut Vec<FileItem<T>>, variant: Vec<FileItem<T>>, name: impl Fn(&T) -> Option<&RigName>) {
     for item in variant {
         // Entries without a name never replace another.
         let twin = base.iter().position(|other| {
-            name(&item.entry).is_some_and(|mine| {
-                name(&other.entry).is_some_and(|its| its.get_ref() == mine.get_ref())
-            })
+            name(&item.entry).is_some_and(|mine| name(&other.entry).is_some_and(|its| its.get_ref() == mine.get_ref()))
         });
         match twin {
             Some(at) => base[at] = item,

@@ -85,9 +85,7 @@ impl PairFunction {
                 PairDerivatives {
                     value: n.dot(&d),
                     gradient,
-                    bias: one.centripetal(&n).dot(&d)
-                        + 2.0 * one.w_WB_W.cross(&n).dot(&dd)
-                        + n.dot(&bias_of_d),
+                    bias: one.centripetal(&n).dot(&d) + 2.0 * one.w_WB_W.cross(&n).dot(&dd) + n.dot(&bias_of_d),
                 }
             }
             PairQuantity::Cosine(a, b) => {
@@ -101,12 +99,7 @@ impl PairFunction {
                         + a.dot(&two.centripetal(&b)),
                 }
             }
-            PairQuantity::Angle {
-                axis,
-                x,
-                x_to,
-                offset,
-            } => {
+            PairQuantity::Angle { axis, x, x_to, offset } => {
                 // Exact if both axes agree, as the joint's own equations require:
                 // then the axis' own rotation has no effect on the second derivative.
                 let y = one.R_WB * axis.cross(x);

@@ -120,9 +120,7 @@ impl<'r> RigPlant<'r> {
     ///
     /// Fails if the rig cannot move further; its state is then unchanged.
     pub fn step(&mut self, drives: &[f64], dt: f64) -> Result<(), PlantError> {
-        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> {
-            x.iter().zip(by).map(|(x, d)| x + h * d).collect()
-        };
+        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> { x.iter().zip(by).map(|(x, d)| x + h * d).collect() };
         let (q, qd) = (self.q.clone(), self.qd.clone());
         let mut slopes: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         for share in [0.0, 0.5, 0.5, 1.0] {
@@ -151,12 +149,7 @@ impl<'r> RigPlant<'r> {
     }
 
     /// Accelerations in a state, by Newton's method on the inverse dynamics.
-    fn accelerations_at(
-        &mut self,
-        q: &[f64],
-        qd: &[f64],
-        drives: &[f64],
-    ) -> Result<Vec<f64>, PlantError> {
+    fn accelerations_at(&mut self, q: &[f64], qd: &[f64], drives: &[f64]) -> Result<Vec<f64>, PlantError> {
         let (n, expected) = (q.len(), self.rig.drives.len());
         if drives.len() != expected {
             let found = drives.len();

@@ -56,9 +56,6 @@ mod tests {
         };
         let mut noise = GaussianNoise::new(0, 0);
         assert_eq!(channel.read(1.1, &mut noise).to_bits(), 1.0_f64.to_bits());
-        assert_eq!(
-            channel.read(-1.2, &mut noise).to_bits(),
-            (-1.25_f64).to_bits()
-        );
+        assert_eq!(channel.read(-1.2, &mut noise).to_bits(), (-1.25_f64).to_bits());
     }
 }

@@ -80,17 +80,11 @@ impl fmt::Display for SimulationError {
             ),
             Self::Nominal(reason) => write!(f, "in the nominal configuration {reason}"),
             Self::Pose { time, reason } => write!(f, "at t = {time} s {reason}"),
-            Self::NotFinite {
-                time,
-                column,
-                largest,
-            } => {
+            Self::NotFinite { time, column, largest } => {
                 write!(f, "at t = {time} s `{column}` is not finite; ")?;
                 match largest {
                     Some(largest) => write!(f, "{largest} is too large to compute with"),
-                    None => {
-                        f.write_str("look for very large numbers in the rig and in the trajectory")
-                    }
+                    None => f.write_str("look for very large numbers in the rig and in the trajectory"),
                 }
             }
             Self::NothingLeft { delay } => write!(
@@ -208,10 +202,7 @@ pub fn simulate(
     let mut past: Vec<(f64, Vec<SimulatedInstant>)> = Vec::new();
     for delay in delays(rig) {
         let earlier: Vec<f64> = times.iter().map(|t| t - delay).collect();
-        past.push((
-            delay,
-            forces_along(rig, trajectory, &earlier, &mut progress)?,
-        ));
+        past.push((delay, forces_along(rig, trajectory, &earlier, &mut progress)?));
     }
     // Delays are compared bit by bit, since they come from the same numbers.
     let at = |delay: f64| {
@@ -241,21 +232,17 @@ pub fn simulate(
             ("_dd", |s: &RigState| &s.qdd),
         ] {
             for (k, (name, encoder)) in names.clone().zip(&rig.sensors.encoders).enumerate() {
-                let values = at(encoder.delay)
-                    .iter()
-                    .map(|instant| of(&instant.state)[k]);
+                let values = at(encoder.delay).iter().map(|instant| of(&instant.state)[k]);
                 columns.push((format!("{name}{suffix}"), values.collect()));
             }
         }
     } else {
-        notes.push("positions only, as encoders give them; `derivatives = true` in `[sampling]` adds exact derivatives".to_owned());
+        notes.push(
+            "positions only, as encoders give them; `derivatives = true` in `[sampling]` adds exact derivatives"
+                .to_owned(),
+        );
     }
-    for (d, (drive, sensor)) in rig
-        .drives
-        .iter()
-        .zip(&rig.sensors.force_sensors)
-        .enumerate()
-    {
+    for (d, (drive, sensor)) in rig.drives.iter().zip(&rig.sensors.force_sensors).enumerate() {
         let mut noise = noise();
         let values = at(sensor.delay + force_delay(rig)).iter();
         let read = values.map(|instant| sensor.read(instant.forces[d], &mut noise));
@@ -301,10 +288,7 @@ fn largest_number(rig: &Rig) -> Option<String> {
 
 /// Times of the samples, those of the trajectory or evenly spaced, with notes. Times at which a delayed reading would
 /// lie before the trajectory are left out.
-fn sample_times(
-    rig: &Rig,
-    trajectory: &Trajectory,
-) -> Result<(Vec<f64>, Vec<String>), SimulationError> {
+fn sample_times(rig: &Rig, trajectory: &Trajectory) -> Result<(Vec<f64>, Vec<String>), SimulationError> {
     let given = trajectory.time();
     let (start, end) = (given[0], given[given.len() - 1]);
     let all = match rig.sensors.rate {
@@ -343,11 +327,7 @@ fn sample_times(
 fn delays(rig: &Rig) -> Vec<f64> {
     let encoders = rig.sensors.encoders.iter().map(|channel| channel.delay);
     let lag = force_delay(rig);
-    let forces = rig
-        .sensors
-        .force_sensors
-        .iter()
-        .map(|channel| channel.delay + lag);
+    let forces = rig.sensors.force_sensors.iter().map(|channel| channel.delay + lag);
     let mut delays: Vec<f64> = encoders.chain(forces).filter(|d| *d > 0.0).collect();
     delays.sort_by(f64::total_cmp);
     delays.dedup();

@@ -80,10 +80,7 @@ impl Trajectory {
     /// From times, s, and one entry per coordinate.
     ///
     /// Fails if times do not increase, lengths differ, or derivatives cannot be computed.
-    pub fn new(
-        time: Vec<f64>,
-        coordinates: Vec<CoordinateSamples>,
-    ) -> Result<Self, TrajectoryError> {
+    pub fn new(time: Vec<f64>, coordinates: Vec<CoordinateSamples>) -> Result<Self, TrajectoryError> {
         if time.is_empty() {
             return Err(TrajectoryError::Empty);
         }
@@ -91,8 +88,7 @@ impl Trajectory {
         if let Some(at) = time.windows(2).position(|pair| !grows(pair)) {
             return Err(TrajectoryError::TimeGoesBack { sample: at + 1 });
         }
-        let sound =
-            |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
+        let sound = |column: &[f64]| column.len() == time.len() && column.iter().all(|x| x.is_finite());
         let mut complete = Vec::new();
         for (k, given) in coordinates.into_iter().enumerate() {
             let columns = [Some(&given.q), given.qd.as_ref(), given.qdd.as_ref()];
@@ -122,17 +118,11 @@ impl Trajectory {
     /// From times, s, and a function that returns the state at each, for example a Fourier series.
     ///
     /// Fails if times do not increase or a state is not finite.
-    pub fn from_function(
-        time: Vec<f64>,
-        state: impl Fn(f64) -> RigState,
-    ) -> Result<Self, TrajectoryError> {
+    pub fn from_function(time: Vec<f64>, state: impl Fn(f64) -> RigState) -> Result<Self, TrajectoryError> {
         let states: Vec<RigState> = time.iter().map(|t| state(*t)).collect();
         let n = states.first().map_or(0, |state| state.q.len());
         let column = |of: fn(&RigState) -> &Vec<f64>, k: usize| -> Vec<f64> {
-            states
-                .iter()
-                .filter_map(|state| of(state).get(k).copied())
-                .collect()
+            states.iter().filter_map(|state| of(state).get(k).copied()).collect()
         };
         let samples = (0..n).map(|k| CoordinateSamples {
             q: column(|state| &state.q, k),
@@ -265,11 +255,7 @@ mod tests {
     #[test]
     fn polynomials_of_degree_four_are_differentiated_exactly() {
         let q = along(|t| 1.0 - t + 2.0 * t * t - t.powi(4));
-        let only = CoordinateSamples {
-            q,
-            qd: None,
-            qdd: None,
-        };
+        let only = CoordinateSamples { q, qd: None, qdd: None };
         let trajectory = Trajectory::new(TIME.to_vec(), vec![only]).expect("enough samples");
         for t in TIME {
             let state = trajectory.state_at(t);
@@ -309,10 +295,7 @@ mod tests {
             new(&[0.0, 0.1, 0.1], &[0.0; 3]),
             TrajectoryError::TimeGoesBack { sample: 2 }
         );
-        assert_eq!(
-            new(&[0.0, 0.1], &[0.0; 3]),
-            TrajectoryError::Faulty { coordinate: 0 }
-        );
+        assert_eq!(new(&[0.0, 0.1], &[0.0; 3]), TrajectoryError::Faulty { coordinate: 0 });
         assert_eq!(new(&[0.0, 0.1], &[0.0; 2]), TrajectoryError::TooShort);
     }
 }

@@ -9,12 +9,7 @@ use crate::Real;
 
 /// Type of a variable: one number, or as many as a vector register of the machine takes.
 pub trait ProgramValue:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// A number as a value like `self`.
     #[must_use]
@@ -284,9 +279,6 @@ mod tests {
     #[test]
     fn single_precision_takes_the_same_numbers() {
         let x = Var(3.0_f32);
-        assert_eq!(
-            (0.5 * x + 0.1).get().to_bits(),
-            (0.5 * 3.0_f32 + 0.1).to_bits()
-        );
+        assert_eq!((0.5 * x + 0.1).get().to_bits(), (0.5 * 3.0_f32 + 0.1).to_bits());
     }
 }

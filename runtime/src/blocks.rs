@@ -30,11 +30,7 @@ pub trait StateProgram<T: Real, const INPUTS: usize, const OUTPUTS: usize> {
     ///
     /// # Errors
     /// A pose error of the model.
-    fn complete(
-        &self,
-        _inputs: &mut [T; INPUTS],
-        _last: Option<&[T; INPUTS]>,
-    ) -> Result<(), PoseError> {
+    fn complete(&self, _inputs: &mut [T; INPUTS], _last: Option<&[T; INPUTS]>) -> Result<(), PoseError> {
         Ok(())
     }
 
@@ -179,11 +175,7 @@ impl fmt::Display for BlockError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::At { sample, reason } => write!(f, "at sample {sample}: {reason}"),
-            Self::Length {
-                array,
-                found,
-                expected,
-            } => write!(
+            Self::Length { array, found, expected } => write!(
                 f,
                 "the array of `{array}` has {found} numbers where {expected} are expected"
             ),
@@ -212,9 +204,7 @@ trait BlockVisitor<L, const OUTPUTS: usize> {
 /// A function that receives the results.
 struct FunctionVisitor<F>(F);
 
-impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
-    for FunctionVisitor<F>
-{
+impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for FunctionVisitor<F> {
     #[inline]
     fn visit(&mut self, block: StateBlock<'_, L, OUTPUTS>) {
         (self.0)(block);
@@ -224,9 +214,7 @@ impl<L, F: FnMut(StateBlock<'_, L, OUTPUTS>), const OUTPUTS: usize> BlockVisitor
 /// Columns that the results are written to.
 struct ColumnVisitor<'a, 'b, T, const OUTPUTS: usize>(&'a mut [&'b mut [T]; OUTPUTS]);
 
-impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS>
-    for ColumnVisitor<'_, '_, T, OUTPUTS>
-{
+impl<T: Copy, L: CacheLine<T>, const OUTPUTS: usize> BlockVisitor<L, OUTPUTS> for ColumnVisitor<'_, '_, T, OUTPUTS> {
     #[allow(
         clippy::inline_always,
         reason = "a function of its own would copy with the narrowest vectors"
@@ -321,17 +309,12 @@ where
 ///
 /// # Errors
 /// An array whose length is not `OUTPUTS` times that of the first input.
-pub fn columns_of<T, const OUTPUTS: usize>(
-    array: &mut [T],
-    n: usize,
-) -> Result<[&mut [T]; OUTPUTS], BlockError> {
+pub fn columns_of<T, const OUTPUTS: usize>(array: &mut [T], n: usize) -> Result<[&mut [T]; OUTPUTS], BlockError> {
     let expected = OUTPUTS * n;
     same_length("output", core::iter::once(array.len()), expected)?;
     let mut rest = array;
     Ok(core::array::from_fn(|_| {
-        let (column, after) = core::mem::take(&mut rest)
-            .split_at_mut_checked(n)
-            .unwrap_or_default();
+        let (column, after) = core::mem::take(&mut rest).split_at_mut_checked(n).unwrap_or_default();
         rest = after;
         column
     }))
@@ -362,13 +345,7 @@ fn same_length(
     expected: usize,
 ) -> Result<(), BlockError> {
     let other = lengths.find(|found| *found != expected);
-    other.map_or(Ok(()), |found| {
-        Err(BlockError::Length {
-            array,
-            found,
-            expected,
-        })
-    })
+    other.map_or(Ok(()), |found| Err(BlockError::Length { array, found, expected }))
 }
 
 /// Evaluates all states, line by line.
@@ -400,33 +377,27 @@ where
             let left = self.n - first;
             // Full lines are read in place. The last one is filled up in a buffer, as are lines whose inputs are
             // completed.
-            let (inputs, len): ([&[T]; INPUTS], usize) =
-                if P::COMPLETED == 0 && left >= T::Line::LENGTH {
-                    let len = left - left % T::Line::LENGTH;
-                    let part = |array: &'a [T]| array.get(first..first + len).unwrap_or_default();
-                    (self.inputs.map(part), len)
-                } else {
-                    let mut len = T::Line::LENGTH.min(left);
-                    for (line, array) in lines.iter_mut().zip(self.inputs) {
-                        load_line(line, array, first, len);
-                    }
-                    if P::COMPLETED > 0
-                        && let Err((k, reason)) =
-                            complete_line(self.program, &mut lines, len, &mut last)
-                    {
-                        (len, fault) = (k, Some(reason));
-                    }
-                    (lines.each_ref().map(AsRef::as_ref), len)
-                };
+            let (inputs, len): ([&[T]; INPUTS], usize) = if P::COMPLETED == 0 && left >= T::Line::LENGTH {
+                let len = left - left % T::Line::LENGTH;
+                let part = |array: &'a [T]| array.get(first..first + len).unwrap_or_default();
+                (self.inputs.map(part), len)
+            } else {
+                let mut len = T::Line::LENGTH.min(left);
+                for (line, array) in lines.iter_mut().zip(self.inputs) {
+                    load_line(line, array, first, len);
+                }
+                if P::COMPLETED > 0
+                    && let Err((k, reason)) = complete_line(self.program, &mut lines, len, &mut last)
+                {
+                    (len, fault) = (k, Some(reason));
+                }
+                (lines.each_ref().map(AsRef::as_ref), len)
+            };
             let mut at = 0;
             while at < len || fault.is_some() {
                 let mut done = T::Line::LENGTH.min(len - at);
-                let regular =
-                    fault.is_none() && vectors.run_line(self.program, &inputs, at, &mut outputs);
-                if !regular
-                    && let Err((k, reason)) =
-                        run_each_state(self.program, &inputs, at, done, &mut outputs)
-                {
+                let regular = fault.is_none() && vectors.run_line(self.program, &inputs, at, &mut outputs);
+                if !regular && let Err((k, reason)) = run_each_state(self.program, &inputs, at, done, &mut outputs) {
                     (done, fault) = (k, Some(reason));
                 }
                 self.visit.visit(StateBlock {

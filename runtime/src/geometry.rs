@@ -51,9 +51,7 @@ mod tests {
 
     #[test]
     fn differences_that_rounding_leaves_are_no_divisors() {
-        let vanishes = Err(SpecialGeometry {
-            denominator: "a - b",
-        });
+        let vanishes = Err(SpecialGeometry { denominator: "a - b" });
         let difference = |a: f64, b: f64| divisor("a - b", Var(a - b), Var(a.abs() + b.abs()));
         assert_eq!(difference(0.3, 0.300_000_1), Ok(()));
         assert_eq!(difference(0.300_000_000_000_000_04, 0.3), vanishes);

@@ -75,10 +75,7 @@ impl LaneAngle for f64 {
         let cos = (c & !swap) | (s & swap);
         let sin_sign = (quarter & 2) << 62;
         let cos_sign = (quarter.wrapping_add(1) & 2) << 62;
-        (
-            Self::from_bits(sin ^ sin_sign),
-            Self::from_bits(cos ^ cos_sign),
-        )
+        (Self::from_bits(sin ^ sin_sign), Self::from_bits(cos ^ cos_sign))
     }
 }
 
@@ -203,23 +200,16 @@ mod tests {
     #[test]
     fn several_angles_are_one_by_one() {
         for scale in [1e-3, 3.0, 1e3, 1e5, 1e7] {
-            let angles: [f64; 7] = core::array::from_fn(|k| {
-                scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0)))
-            });
+            let angles: [f64; 7] =
+                core::array::from_fn(|k| scale * (0.37 + 0.21 * f64::from(u8::try_from(k).unwrap_or(0))));
             let (sin, cos) = Real::sin_cos_all(angles);
             let single: [f32; 7] = angles.map(Real::from_f64);
             let (sin32, cos32) = Real::sin_cos_all(single);
             for k in 0..7 {
                 let (s, c) = Real::sin_cos(angles[k]);
-                assert_eq!(
-                    (sin[k].to_bits(), cos[k].to_bits()),
-                    (s.to_bits(), c.to_bits())
-                );
+                assert_eq!((sin[k].to_bits(), cos[k].to_bits()), (s.to_bits(), c.to_bits()));
                 let (s, c) = Real::sin_cos(single[k]);
-                assert_eq!(
-                    (sin32[k].to_bits(), cos32[k].to_bits()),
-                    (s.to_bits(), c.to_bits())
-                );
+                assert_eq!((sin32[k].to_bits(), cos32[k].to_bits()), (s.to_bits(), c.to_bits()));
             }
         }
     }
@@ -229,10 +219,7 @@ mod tests {
         let (mut s, mut c) = ([0.0; 4], [0.0; 4]);
         sin_cos_lanes(&[1e20, 0.3, f64::NAN, f64::INFINITY], &mut s, &mut c);
         let (sin, cos) = Real::sin_cos(1e20_f64);
-        assert_eq!(
-            (s[0].to_bits(), c[0].to_bits()),
-            (sin.to_bits(), cos.to_bits())
-        );
+        assert_eq!((s[0].to_bits(), c[0].to_bits()), (sin.to_bits(), cos.to_bits()));
         assert!(s[2].is_nan() && c[3].is_nan() && ulps(s[1], Real::sin_cos(0.3_f64).0) <= 1.0);
     }
 }

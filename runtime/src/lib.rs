@@ -35,8 +35,8 @@ pub use geometry::{SpecialGeometry, divisor};
 pub use lanes::{LARGEST_ANGLE, sin_cos_lanes};
 pub use loops::{Loops, Scales, correct, follow, solve_passive};
 pub use model::{
-    Assembly, ContinuationProgram, Drives, Linearisation, LoadedState, Passive, ProgramRun, Run,
-    State, accelerations, check_base, check_block_input, run_checked, run_unchecked,
+    Assembly, ContinuationProgram, Drives, Linearisation, LoadedState, Passive, ProgramRun, Run, State, accelerations,
+    check_base, check_block_input, run_checked, run_unchecked,
 };
 pub use numbers::{AngleBatch, Numbers, OutputSink, ScalarNumbers, ZeroedOutputs};
 pub use random::{RandomBits, scramble_bits};
@@ -48,9 +48,9 @@ pub use solve::solve;
 /// What emitted modules bring into scope.
 pub mod emitted {
     pub use crate::{
-        Assembly, BaseParameter, Linearisation, Loops, Numbers, PoseError, Quantity, Real, Run,
-        ScalarNumbers, Scales, SpecialGeometry, Term, Var, accelerations, check_base, check_finite,
-        divisor, read, run_checked, run_unchecked, solve_passive, values, variables,
+        Assembly, BaseParameter, Linearisation, Loops, Numbers, PoseError, Quantity, Real, Run, ScalarNumbers, Scales,
+        SpecialGeometry, Term, Var, accelerations, check_base, check_finite, divisor, read, run_checked, run_unchecked,
+        solve_passive, values, variables,
     };
 }
 
@@ -98,8 +98,7 @@ pub fn check_finite<T: Real>(values: &[T], names: &[&'static str]) -> Result<(),
         return Ok(());
     }
     let mut named = values.iter().zip(names);
-    let found =
-        named.find(|(value, _)| value.abs().partial_cmp(&T::largest()) != Some(Ordering::Less));
+    let found = named.find(|(value, _)| value.abs().partial_cmp(&T::largest()) != Some(Ordering::Less));
     found.map_or(Ok(()), |(_, name)| Err(PoseError::NotFinite(name)))
 }
 
@@ -138,12 +137,7 @@ pub struct BaseParameter {
 impl BaseParameter {
     /// Name, retained product, SI unit, and expression.
     #[must_use]
-    pub const fn new(
-        name: &'static str,
-        retained: &'static str,
-        unit: &'static str,
-        expression: &'static str,
-    ) -> Self {
+    pub const fn new(name: &'static str, retained: &'static str, unit: &'static str, expression: &'static str) -> Self {
         Self {
             name,
             retained,

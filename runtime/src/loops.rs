@@ -31,18 +31,10 @@ pub trait Loops {
     type Matrix: AsRef<[Self::Passive]> + AsMut<[Self::Passive]>;
 
     /// Residuals of the loops, and their derivatives by the passive coordinates: one row per residual.
-    fn linearise(
-        &self,
-        active: &Self::Active,
-        passive: &Self::Passive,
-    ) -> (Self::Passive, Self::Matrix);
+    fn linearise(&self, active: &Self::Active, passive: &Self::Passive) -> (Self::Passive, Self::Matrix);
 
     /// Scales at a pose with which residuals and coordinates are compared.
-    fn scales(
-        &self,
-        active: &Self::Active,
-        passive: &Self::Passive,
-    ) -> Scales<Self::Active, Self::Passive>;
+    fn scales(&self, active: &Self::Active, passive: &Self::Passive) -> Scales<Self::Active, Self::Passive>;
 }
 
 /// Magnitudes at a pose.
@@ -61,11 +53,7 @@ pub struct Scales<A, P> {
 /// # Errors
 /// [`PoseError::OutOfReach`] if the loops do not close to rounding, [`PoseError::Singular`] if the passive coordinates
 /// are not determined.
-pub fn solve_passive<L: Loops>(
-    loops: &L,
-    active: &L::Active,
-    guess: &L::Passive,
-) -> Result<L::Passive, PoseError> {
+pub fn solve_passive<L: Loops>(loops: &L, active: &L::Active, guess: &L::Passive) -> Result<L::Passive, PoseError> {
     newton(loops, active, guess, &FIRST_POSE).map(|found| found.passive)
 }
 
@@ -74,11 +62,7 @@ pub fn solve_passive<L: Loops>(
 /// # Errors
 /// As [`solve_passive`]; also [`PoseError::OutOfReach`] if the guess is so far away that another assembly might be
 /// found.
-pub fn correct<L: Loops>(
-    loops: &L,
-    active: &L::Active,
-    guess: &L::Passive,
-) -> Result<L::Passive, PoseError> {
+pub fn correct<L: Loops>(loops: &L, active: &L::Active, guess: &L::Passive) -> Result<L::Passive, PoseError> {
     newton(loops, active, guess, &NEARBY_POSE).map(|found| found.passive)
 }
 
@@ -110,11 +94,7 @@ pub fn follow<L: Loops>(
         // A remainder of about the length of rounding is added to the last stride.
         let remains = one - done;
         let last = stride * number(1.001) >= remains;
-        let (next, way) = if last {
-            (one, remains)
-        } else {
-            (done + stride, stride)
-        };
+        let (next, way) = if last { (one, remains) } else { (done + stride, stride) };
         let mut active = to.clone();
         if !last {
             // `active` starts as `to` and becomes the point on the way there.
@@ -258,10 +238,7 @@ fn newton<L: Loops>(
             *x = *x - cut * *dx;
         }
         if closed && size <= tiny || size < number(rule.enough) {
-            return Ok(NewtonResult {
-                passive,
-                contraction,
-            });
+            return Ok(NewtonResult { passive, contraction });
         }
         if let Some(contraction) = rule.contraction {
             longest = size * number(contraction);
@@ -312,10 +289,7 @@ mod tests {
 
         fn linearise(&self, [q]: &[f64; 1], [phi, x]: &[f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
             let ((s, c), (sp, cp)) = (q.sin_cos(), phi.sin_cos());
-            let residual = [
-                self.crank * c + self.rod * cp - x,
-                self.crank * s + self.rod * sp,
-            ];
+            let residual = [self.crank * c + self.rod * cp - x, self.crank * s + self.rod * sp];
             (residual, [[-self.rod * sp, -1.0], [self.rod * cp, 0.0]])
         }
 
@@ -355,10 +329,7 @@ mod tests {
 
     #[test]
     fn a_pose_out_of_reach_is_an_error() {
-        let slider = Slider {
-            crank: 0.9,
-            rod: 0.4,
-        };
+        let slider = Slider { crank: 0.9, rod: 0.4 };
         let farthest = (0.4_f64 / 0.9).asin();
         let start = first(&slider);
         let to = |q: f64| follow(&slider, &[0.0], &start, &[q]);
@@ -372,10 +343,7 @@ mod tests {
 
     #[test]
     fn a_guess_leads_to_its_own_assembly_or_nowhere() {
-        let slider = Slider {
-            crank: 0.4,
-            rod: 0.9,
-        };
+        let slider = Slider { crank: 0.4, rod: 0.9 };
         let (mut found, mut refused) = (0, 0);
         for q in (0..60).map(|k| 0.1 * f64::from(k)) {
             // The rod stands upright at pi/2, where the assemblies meet.

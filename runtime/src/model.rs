@@ -2,8 +2,7 @@
 
 use crate::blocks::{BlockError, StateProgram};
 use crate::{
-    Loops, OutputSink, PoseError, Real, Scales, Term, Var, ZeroedOutputs, check_finite, correct,
-    follow, solve,
+    Loops, OutputSink, PoseError, Real, Scales, Term, Var, ZeroedOutputs, check_finite, correct, follow, solve,
 };
 
 /// Motion of the independent coordinates, rad or m, and seconds.
@@ -77,9 +76,7 @@ impl<T, const ACTIVE: usize, const DRIVES: usize> OutputSink<T> for Drives<T, AC
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T>
-    for Drives<T, ACTIVE, DRIVES>
-{
+impl<T: Real, const ACTIVE: usize, const DRIVES: usize> ZeroedOutputs<T> for Drives<T, ACTIVE, DRIVES> {
     fn zeros() -> Self {
         Self {
             coordinate: ZeroedOutputs::zeros(),
@@ -125,9 +122,7 @@ impl<T, const VALUES: usize, const ROWS: usize> OutputSink<T> for Linearisation<
     }
 }
 
-impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T>
-    for Linearisation<T, VALUES, ROWS>
-{
+impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T> for Linearisation<T, VALUES, ROWS> {
     fn zeros() -> Self {
         Self {
             values: ZeroedOutputs::zeros(),
@@ -137,9 +132,7 @@ impl<T: Real, const VALUES: usize, const ROWS: usize> ZeroedOutputs<T>
 }
 
 #[allow(clippy::inline_always, reason = "one store")]
-impl<T, const ACTIVE: usize, const PASSIVE: usize> OutputSink<T>
-    for Scales<[T; ACTIVE], [T; PASSIVE]>
-{
+impl<T, const ACTIVE: usize, const PASSIVE: usize> OutputSink<T> for Scales<[T; ACTIVE], [T; PASSIVE]> {
     #[inline(always)]
     fn put(&mut self, k: usize, value: impl Term<T>) {
         if k < PASSIVE {
@@ -152,9 +145,7 @@ impl<T, const ACTIVE: usize, const PASSIVE: usize> OutputSink<T>
     }
 }
 
-impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> ZeroedOutputs<T>
-    for Scales<[T; ACTIVE], [T; PASSIVE]>
-{
+impl<T: Real, const ACTIVE: usize, const PASSIVE: usize> ZeroedOutputs<T> for Scales<[T; ACTIVE], [T; PASSIVE]> {
     fn zeros() -> Self {
         Self {
             residual: ZeroedOutputs::zeros(),
@@ -186,10 +177,7 @@ where
 
 /// Runs a program that does not check its inputs.
 #[inline]
-pub fn run_unchecked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(
-    program: &P,
-    inputs: [T; INPUTS],
-) -> R
+pub fn run_unchecked<T, P, R, const INPUTS: usize, const OUTPUTS: usize>(program: &P, inputs: [T; INPUTS]) -> R
 where
     T: Real,
     P: StateProgram<T, INPUTS, OUTPUTS>,
@@ -457,11 +445,7 @@ pub trait Assembly: Loops {
     ///
     /// # Errors
     /// As [`Self::passive_position`].
-    fn passive_position_near(
-        &self,
-        q: &Self::Active,
-        guess: &Self::Passive,
-    ) -> Result<Self::Passive, PoseError>
+    fn passive_position_near(&self, q: &Self::Active, guess: &Self::Passive) -> Result<Self::Passive, PoseError>
     where
         Self: Sized,
     {
@@ -496,11 +480,7 @@ where
         self.0.run(numbers, inputs, outputs)
     }
 
-    fn complete(
-        &self,
-        inputs: &mut [T; INPUTS],
-        last: Option<&[T; INPUTS]>,
-    ) -> Result<(), PoseError> {
+    fn complete(&self, inputs: &mut [T; INPUTS], last: Option<&[T; INPUTS]>) -> Result<(), PoseError> {
         let model = self.1;
         let active = |from: &[T; INPUTS]| {
             let mut q = model.nominal_active();

@@ -61,11 +61,7 @@ pub trait Numbers {
     ///
     /// # Errors
     /// [`PoseError::Singular`] for one number. A block records the failure and evaluates its states one by one.
-    fn regular(
-        &self,
-        x: impl Term<Self::Value>,
-        size: impl Term<Self::Value>,
-    ) -> Result<(), PoseError>;
+    fn regular(&self, x: impl Term<Self::Value>, size: impl Term<Self::Value>) -> Result<(), PoseError>;
     /// Checks that a value is a finite number.
     ///
     /// # Errors

@@ -196,14 +196,7 @@ real!(
     libm::tanh,
     libm::exp
 );
-real!(
-    f32,
-    sin_cos_single,
-    libm::sqrtf,
-    libm::atan2f,
-    libm::tanhf,
-    libm::expf
-);
+real!(f32, sin_cos_single, libm::sqrtf, libm::atan2f, libm::tanhf, libm::expf);
 
 #[cfg(test)]
 mod tests {

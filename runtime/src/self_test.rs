@@ -81,28 +81,16 @@ impl fmt::Display for SelfTestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Geometry(special) => special.fmt(f),
-            Self::TooFewStates {
-                found,
-                needed,
-                last,
-            } => write!(
+            Self::TooFewStates { found, needed, last } => write!(
                 f,
                 "the model can be evaluated at only {found} of {needed} random states around the nominal pose; the \
                  last failure was: {last}"
             ),
-            Self::Rank {
-                of,
-                found,
-                expected,
-            } => write!(
+            Self::Rank { of, found, expected } => write!(
                 f,
                 "{of} has rank {found} at random states, but the model has {expected} base parameters"
             ),
-            Self::Forces {
-                of,
-                expected,
-                found,
-            } => write!(
+            Self::Forces { of, expected, found } => write!(
                 f,
                 "{of} gives a force of {found}, but all parameters together give {expected}"
             ),
@@ -127,11 +115,7 @@ pub type ShowRows<'a, const N_PRODUCTS: usize, const N_BASE: usize> =
 pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
     products: &[f64; N_PRODUCTS],
     base: &[f64; N_BASE],
-    mut rows: impl FnMut(
-        &mut Random,
-        f64,
-        &mut ShowRows<'_, N_PRODUCTS, N_BASE>,
-    ) -> Result<(), PoseError>,
+    mut rows: impl FnMut(&mut Random, f64, &mut ShowRows<'_, N_PRODUCTS, N_BASE>) -> Result<(), PoseError>,
 ) -> Result<(), SelfTestError> {
     /// How often the range of the states is halved before the test fails.
     const HALVINGS: usize = 4;
@@ -157,11 +141,7 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
                     // Written so that NaN fails as well.
                     let holds = Real::abs(found - expected) <= limit;
                     if worst.is_none() && !holds {
-                        worst = Some(SelfTestError::Forces {
-                            of,
-                            expected,
-                            found,
-                        });
+                        worst = Some(SelfTestError::Forces { of, expected, found });
                     }
                 }
             });
@@ -173,11 +153,7 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
         reach *= 0.5;
     }
     if found < needed {
-        return Err(SelfTestError::TooFewStates {
-            found,
-            needed,
-            last,
-        });
+        return Err(SelfTestError::TooFewStates { found, needed, last });
     }
     // Both regressors must have as many independent columns as there are base parameters.
     for (of, found) in [("H_min", few.rank()), ("H", all.rank())] {
@@ -195,9 +171,7 @@ pub fn self_test<const N_PRODUCTS: usize, const N_BASE: usize>(
 /// A row times a column, and the sum of the magnitudes of its terms.
 fn product_and_magnitude<const N: usize>(row: &[f64; N], column: &[f64; N]) -> (f64, f64) {
     let terms = row.iter().zip(column).map(|(a, b)| a * b);
-    terms.fold((0.0, 0.0), |(sum, size), term| {
-        (sum + term, size + Real::abs(term))
-    })
+    terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + Real::abs(term)))
 }
 
 /// The R factor of a QR factorisation that takes row after row by rotations (Givens 1958).
@@ -255,8 +229,7 @@ impl<const N: usize> GivensFactor<N> {
                     continue;
                 };
                 for first in before {
-                    let (a, b, mixed) =
-                        (dot(first, first), dot(second, second), dot(first, second));
+                    let (a, b, mixed) = (dot(first, first), dot(second, second), dot(first, second));
                     if Real::abs(mixed) <= ROUNDING * Real::sqrt(a * b) || a * b == 0.0 {
                         continue;
                     }
@@ -276,9 +249,7 @@ impl<const N: usize> GivensFactor<N> {
             }
         }
         let sizes = columns.map(|column| Real::sqrt(dot(&column, &column)));
-        let largest = sizes
-            .iter()
-            .fold(0.0, |m: f64, x| if *x > m { *x } else { m });
+        let largest = sizes.iter().fold(0.0, |m: f64, x| if *x > m { *x } else { m });
         sizes.iter().filter(|x| **x > ZERO_SHARE * largest).count()
     }
 }

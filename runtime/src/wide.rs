@@ -20,9 +20,7 @@ use std::sync::OnceLock;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::arithmetic::{ProgramValue, Term, Var};
-use crate::blocks::{
-    BlockError, BlockScalar, CacheLine, Line32, Line64, StateProgram, VectorJob, VectorWidth,
-};
+use crate::blocks::{BlockError, BlockScalar, CacheLine, Line32, Line64, StateProgram, VectorJob, VectorWidth};
 use crate::lanes::{self, LARGEST_ANGLE, reduced_sin_cos};
 use crate::numbers::AngleBatch;
 use crate::{Numbers, OutputSink, PoseError, Real};
@@ -478,10 +476,7 @@ impl<S: Simd> Wide32<S> {
         }
         let read = |line: &[f32; Line32::LENGTH]| {
             let first = S::as_simd_f32s(line).0.first();
-            first.map_or(self, |v| Self {
-                simd: self.simd,
-                v: *v,
-            })
+            first.map_or(self, |v| Self { simd: self.simd, v: *v })
         };
         (read(&sin32), read(&cos32))
     }

@@ -34,10 +34,7 @@ fn main() {
 fn run(name: &str, samples: usize, reach: f64) {
     let derivation = derived(name);
     let sample = Sample::random(&derivation.mechanism, samples, reach, &mut Stream::new(7));
-    let base = base_parameters::base(
-        &derivation,
-        &base_parameters::nominal(&derivation.mechanism),
-    );
+    let base = base_parameters::base(&derivation, &base_parameters::nominal(&derivation.mechanism));
     let evaluator = ModelEvaluator::new(&derivation);
     let mut noise = Stream::new(8);
     let mut measured = evaluator
@@ -64,10 +61,7 @@ fn run(name: &str, samples: usize, reach: f64) {
         "{name:<14} {samples:>9} {:>15.2} Msample/s {:>15.2} Msample/s {memory:>10.1} MiB {:>10} {:>8}",
         rate(best),
         rate(best_wall),
-        numpy.map_or("absent".to_owned(), |seconds| format!(
-            "{:.3}",
-            rate(seconds)
-        )),
+        numpy.map_or("absent".to_owned(), |seconds| format!("{:.3}", rate(seconds))),
         numpy.map_or(String::new(), |seconds| format!("{:.1}", seconds / best)),
     );
 }
@@ -119,9 +113,7 @@ fn processor_seconds() -> f64 {
 fn status(line: &str) -> f64 {
     let text = fs::read_to_string("/proc/self/status").expect("Linux");
     let found = text.lines().find_map(|l| l.strip_prefix(line));
-    let kib = found
-        .and_then(|l| l.split_whitespace().next())
-        .expect("a size");
+    let kib = found.and_then(|l| l.split_whitespace().next()).expect("a size");
     kib.parse::<f64>().expect("a number") / 1024.0
 }
 
@@ -132,22 +124,12 @@ fn reset_peak() -> f64 {
 }
 
 /// Seconds that numpy takes, its answer held against ours; nothing without numpy.
-fn numpy(
-    name: &str,
-    derivation: &Derivation,
-    sample: &Sample,
-    measured: &[Vec<f64>],
-    values: &[f64],
-) -> Option<f64> {
+fn numpy(name: &str, derivation: &Derivation, sample: &Sample, measured: &[Vec<f64>], values: &[f64]) -> Option<f64> {
     let python = std::env::var("MODELMILL_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("estimation-{name}"));
     fs::create_dir_all(&folder).expect("the target folder can be written");
     let write = |file: &str, columns: &[Vec<f64>]| {
-        let bytes: Vec<u8> = columns
-            .iter()
-            .flatten()
-            .flat_map(|x| x.to_le_bytes())
-            .collect();
+        let bytes: Vec<u8> = columns.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         fs::write(folder.join(file), bytes).expect("the target folder can be written");
     };
     write("q", &sample.q);
@@ -164,10 +146,7 @@ fn numpy(
         .output()
         .ok()?;
     if !output.status.success() {
-        eprintln!(
-            "{python}: {}",
-            String::from_utf8_lossy(&output.stderr).trim()
-        );
+        eprintln!("{python}: {}", String::from_utf8_lossy(&output.stderr).trim());
         return None;
     }
     let text = String::from_utf8_lossy(&output.stdout);
@@ -219,11 +198,7 @@ fn source(derivation: &Derivation) -> String {
         };
         writeln!(text, "    v{i} = {value}").expect("a string");
     }
-    let outputs: Vec<String> = program
-        .outputs
-        .iter()
-        .map(|o| format!("v{}", o.index()))
-        .collect();
+    let outputs: Vec<String> = program.outputs.iter().map(|o| format!("v{}", o.index())).collect();
     writeln!(text, "    return [{}]", outputs.join(", ")).expect("a string");
     text
 }

@@ -44,26 +44,17 @@ fn main() -> ExitCode {
 /// Prints the table, running this program under valgrind for every figure.
 fn report(wanted: Option<&str>) -> ExitCode {
     if Command::new("valgrind").arg("--version").output().is_err() {
-        println!(
-            "instruction counts need valgrind, which is not on this machine: nothing was measured"
-        );
+        println!("instruction counts need valgrind, which is not on this machine: nothing was measured");
         return ExitCode::SUCCESS;
     }
-    println!(
-        "instructions per call, per sample of a block, or per model generated (valgrind, callgrind)"
-    );
-    println!(
-        "additions + multiplications (divisions, roots, sine-cosine pairs) as printed with the model"
-    );
+    println!("instructions per call, per sample of a block, or per model generated (valgrind, callgrind)");
+    println!("additions + multiplications (divisions, roots, sine-cosine pairs) as printed with the model");
     println!(
         "{:<18} {:<24} {:>20} {:>15}",
         "model", "function", "operations", "instructions"
     );
     let mut empty = None;
-    for name in MODELS
-        .iter()
-        .filter(|name| wanted.is_none_or(|w| name.contains(w)))
-    {
+    for name in MODELS.iter().filter(|name| wanted.is_none_or(|w| name.contains(w))) {
         let programs = derived(name).programs;
         let near = (*name == "three_rrr").then_some(NEAR);
         for (function, calls, states) in FUNCTIONS.into_iter().chain(near) {
@@ -134,8 +125,7 @@ fn measured_by_name(name: &str, function: &str, calls: usize) {
         "H_min, block" | "inverse dynamics, block" => {
             let derivation = derived(name);
             let evaluator = ModelEvaluator::new(&derivation);
-            let sample =
-                Sample::random(&derivation.mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
+            let sample = Sample::random(&derivation.mechanism, 4 * STATES, 0.2, &mut Stream::new(5));
             let sample = sample.reachable(&evaluator).filtered(|i| i < STATES);
             assert_eq!(sample.len(), STATES);
             let states = sample.states();

@@ -59,10 +59,7 @@ fn print_counts() {
             format!("{total} ({}, {}, {})", c.div, c.sqrt, c.sincos)
         };
         let (dynamics, regressor) = (text(&programs.inverse_dynamics), text(&programs.regressor));
-        println!(
-            "{name:<18} {dynamics:>30} {regressor:>30}   {}",
-            best_known(name)
-        );
+        println!("{name:<18} {dynamics:>30} {regressor:>30}   {}", best_known(name));
     }
 }
 
@@ -98,10 +95,7 @@ mod generation {
 }
 
 mod evaluator {
-    use super::{
-        Bencher, ItemsCount, MODELS, ModelEvaluator, STATES, base_parameters, black_box, derived,
-        states,
-    };
+    use super::{Bencher, ItemsCount, MODELS, ModelEvaluator, STATES, base_parameters, black_box, derived, states};
 
     #[divan::bench(args = MODELS, sample_count = 20)]
     fn regressor(bencher: Bencher, name: &str) {
@@ -117,10 +111,7 @@ mod evaluator {
     fn inverse_dynamics(bencher: Bencher, name: &str) {
         let derivation = derived(name);
         let (evaluator, sample) = (ModelEvaluator::new(&derivation), states(&derivation));
-        let base = base_parameters::base(
-            &derivation,
-            &base_parameters::nominal(&derivation.mechanism),
-        );
+        let base = base_parameters::base(&derivation, &base_parameters::nominal(&derivation.mechanism));
         let states = sample.states();
         bencher
             .counter(ItemsCount::new(STATES))

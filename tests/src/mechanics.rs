@@ -7,8 +7,8 @@
 use std::ops::{Add, Mul, Neg, Sub};
 
 use modelmill_spec::{
-    DriveKind, EffectPlace, ExactExpression, ExactFunction, FrameAxis, FrameStep, FreeBody,
-    LumpedMass, Mechanics, Mechanism, ModelSymbol, PartInertia, PlaceQuantity, PointIdx, TwistAxes,
+    DriveKind, EffectPlace, ExactExpression, ExactFunction, FrameAxis, FrameStep, FreeBody, LumpedMass, Mechanics,
+    Mechanism, ModelSymbol, PartInertia, PlaceQuantity, PointIdx, TwistAxes,
 };
 use nalgebra::{DMatrix, Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3};
 
@@ -95,11 +95,7 @@ impl Pose {
     fn then(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|i| {
             std::array::from_fn(|j| {
-                let moved = if j == 3 {
-                    self.0[i][3]
-                } else {
-                    Jet::constant(0.0)
-                };
+                let moved = if j == 3 { self.0[i][3] } else { Jet::constant(0.0) };
                 (0..3).fold(moved, |sum, k| sum + self.0[i][k] * other.0[k][j])
             })
         }))
@@ -132,20 +128,14 @@ impl Pose {
         let [w, x, y, z] = body.quaternion.map(|i| of(i, 0));
         let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let turn: Matrix3<f64> = turn.to_rotation_matrix().into_inner();
-        let vector = |all: &[modelmill_spec::CoordinateIdx], order: usize| {
-            Vector3::from_fn(|k, _| of(all[k], order))
-        };
+        let vector = |all: &[modelmill_spec::CoordinateIdx], order: usize| Vector3::from_fn(|k, _| of(all[k], order));
         let angular = |order: usize| match body.angular {
             TwistAxes::Body => vector(&body.quaternion[1..], order),
             TwistAxes::World => turn.transpose() * vector(&body.quaternion[1..], order),
         };
         let (omega, alpha) = (angular(1), angular(2));
         let skew = omega.cross_matrix();
-        let orders = [
-            turn,
-            turn * skew,
-            turn * (skew * skew + alpha.cross_matrix()),
-        ];
+        let orders = [turn, turn * skew, turn * (skew * skew + alpha.cross_matrix())];
         let [velocity, change] = [1, 2].map(|order| vector(&body.position, order));
         let (velocity, acceleration) = match body.linear {
             TwistAxes::World => (velocity, change),
@@ -155,22 +145,14 @@ impl Pose {
         Self(std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 Jet(std::array::from_fn(|k| {
-                    if j == 3 {
-                        place[k][i]
-                    } else {
-                        orders[k][(i, j)]
-                    }
+                    if j == 3 { place[k][i] } else { orders[k][(i, j)] }
                 }))
             })
         }))
     }
 
     fn point(&self, at: [f64; 3]) -> [Jet; 3] {
-        std::array::from_fn(|i| {
-            (0..3).fold(self.0[i][3], |sum, k| {
-                sum + self.0[i][k] * Jet::constant(at[k])
-            })
-        })
+        std::array::from_fn(|i| (0..3).fold(self.0[i][3], |sum, k| sum + self.0[i][k] * Jet::constant(at[k])))
     }
 
     /// The derivative of the given order as a 4x4 matrix.
@@ -218,9 +200,7 @@ impl<'a> Numbers<'a> {
 
     /// Value of an expression over constants and parameters.
     pub fn value(&self, exact: &ExactExpression) -> f64 {
-        self.value_at(exact, &|_| {
-            unreachable!("no quantity of a place stands here")
-        })
+        self.value_at(exact, &|_| unreachable!("no quantity of a place stands here"))
     }
 
     fn value_at(&self, exact: &ExactExpression, place: &dyn Fn(PlaceQuantity) -> f64) -> f64 {
@@ -273,9 +253,7 @@ impl<'a> Numbers<'a> {
                             total = total
                                 + factor
                                     * match symbol {
-                                        ModelSymbol::Constant(i) => {
-                                            Jet::constant(self.constants[i.0])
-                                        }
+                                        ModelSymbol::Constant(i) => Jet::constant(self.constants[i.0]),
                                         ModelSymbol::Coordinate(i) => coordinates[i.0],
                                         _ => unreachable!("an angle is made of angles"),
                                     };
@@ -314,20 +292,13 @@ impl<'a> Numbers<'a> {
     }
 
     /// Pose that a frame's steps reach behind the one that a coordinate moves, and behind what follows along or about z.
-    pub fn pose_behind(
-        &self,
-        coordinates: &[Jet],
-        frame: usize,
-        coordinate: usize,
-    ) -> Matrix4<f64> {
+    pub fn pose_behind(&self, coordinates: &[Jet], frame: usize, coordinate: usize) -> Matrix4<f64> {
         let moves = |step: &FrameStep| match step {
             FrameStep::Rotate(_, angle) => angle
                 .terms
                 .iter()
                 .any(|(s, _)| matches!(s, ModelSymbol::Coordinate(c) if c.0 == coordinate)),
-            FrameStep::Translate(_, length) => {
-                length.coordinates.iter().any(|(c, _)| c.0 == coordinate)
-            }
+            FrameStep::Translate(_, length) => length.coordinates.iter().any(|(c, _)| c.0 == coordinate),
             FrameStep::Free(body) => {
                 let mut all = body.position.iter().chain(&body.quaternion);
                 all.any(|c| c.0 == coordinate)
@@ -451,9 +422,7 @@ impl<'a> Numbers<'a> {
             let [a, b] = l.joins.map(|p| self.point(&poses, p));
             std::array::from_fn::<Jet, 3, _>(|i| a[i] - b[i])
         });
-        let value = |exact: &ExactExpression| {
-            exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol))
-        };
+        let value = |exact: &ExactExpression| exact.evaluate(&|symbol| self.mechanism.symbol_nominal(symbol));
         let of_couplings = self.mechanism.couplings.iter().map(|coupling| {
             let own = coordinates[coupling.coordinate.0] - Jet::constant(value(&coupling.offset));
             coupling.terms.iter().fold(own, |off, (i, factor)| {
@@ -482,9 +451,7 @@ impl<'a> Numbers<'a> {
                 DriveKind::Linear { from, to } => {
                     let (a, b) = (self.point(&poses, from), self.point(&poses, to));
                     (0..3)
-                        .fold(Jet::constant(0.0), |sum, i| {
-                            sum + (b[i] - a[i]) * (b[i] - a[i])
-                        })
+                        .fold(Jet::constant(0.0), |sum, i| sum + (b[i] - a[i]) * (b[i] - a[i]))
                         .sqrt()
                 }
             })
@@ -546,8 +513,7 @@ impl<'a> Numbers<'a> {
                 let other = motions[(p + 1) % motions.len()];
                 let other = other.unwrap_or(Jet::constant(f64::NAN));
                 if let (Some(Mechanics::Rod), EffectPlace::Drive(d)) = (effect.mechanics, place) {
-                    let [second, first, mass] =
-                        [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
+                    let [second, first, mass] = [0, 1, 2].map(|i| self.parameters[effect.terms[i].parameter.0]);
                     let DriveKind::Linear { from, to } = self.mechanism.drives[d.0].kind else {
                         panic!("a rod lies along a linear drive");
                     };
@@ -563,8 +529,7 @@ impl<'a> Numbers<'a> {
                         EffectPlace::Point(p) => {
                             let point = &self.mechanism.points[p.0];
                             let factor = self.value(&term.expression);
-                            let inertia =
-                                point_mass(parameter * factor, self.vector(&point.at).into());
+                            let inertia = point_mass(parameter * factor, self.vector(&point.at).into());
                             let (pose, change) = (&poses[point.frame.0], &displaced[point.frame.0]);
                             add_body(&mut balance, pose, change, &inertia, &gravity);
                         }
@@ -635,14 +600,7 @@ impl<'a> Numbers<'a> {
         })
     }
 
-    fn add_lump(
-        &self,
-        balance: &mut Balance,
-        pose: &Pose,
-        change: &Pose,
-        lump: &LumpedMass,
-        gravity: &Vector3<f64>,
-    ) {
+    fn add_lump(&self, balance: &mut Balance, pose: &Pose, change: &Pose, lump: &LumpedMass, gravity: &Vector3<f64>) {
         let mass = self.value(&lump.mass) * rational(&lump.share);
         let acceleration = |at: [f64; 3]| -> Vector3<f64> {
             let point = pose.point(at);
@@ -677,11 +635,7 @@ impl<'a> Numbers<'a> {
                 j[(3, 3)] = self.value(mass);
                 j
             }
-            PartInertia::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => {
+            PartInertia::AboutCentre { mass, centre, inertia } => {
                 let inertia: [f64; 6] = std::array::from_fn(|i| self.value(&inertia[i]));
                 spread(inertia) + point_mass(self.value(mass), self.vector(centre).into())
             }
@@ -727,16 +681,10 @@ fn add_rod(
 }
 
 /// The virtual work of what pulls two points together by a constant, by their distance and by its rate.
-fn add_strut(
-    balance: &mut Balance,
-    motions: &[[[Jet; 3]; 2]; 2],
-    [constant, stiffness, damping]: [f64; 3],
-) {
+fn add_strut(balance: &mut Balance, motions: &[[[Jet; 3]; 2]; 2], [constant, stiffness, damping]: [f64; 3]) {
     let [moves, change] = motions.each_ref().map(|[a, b]| {
         let d: [Jet; 3] = std::array::from_fn(|i| b[i] - a[i]);
-        (0..3)
-            .fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i])
-            .sqrt()
+        (0..3).fold(Jet::constant(0.0), |sum, i| sum + d[i] * d[i]).sqrt()
     });
     let pull = constant + stiffness * moves.0[0] + damping * moves.0[1];
     balance.add(pull * change.0[1]);
@@ -754,13 +702,7 @@ fn quantity(motion: Jet, load: f64, other: Jet) -> impl Fn(PlaceQuantity) -> f64
     }
 }
 
-fn add_body(
-    balance: &mut Balance,
-    pose: &Pose,
-    change: &Pose,
-    inertia: &Matrix4<f64>,
-    gravity: &Vector3<f64>,
-) {
+fn add_body(balance: &mut Balance, pose: &Pose, change: &Pose, inertia: &Matrix4<f64>, gravity: &Vector3<f64>) {
     let (a, d) = (pose.derivative(2), change.derivative(1));
     let product = d * inertia * a.transpose();
     for i in 0..3 {

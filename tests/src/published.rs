@@ -282,10 +282,7 @@ impl Map {
                 definitions.insert(name.trim().to_owned(), value);
             } else {
                 for name in line.split_whitespace() {
-                    rows.push((
-                        name.to_owned(),
-                        by_product(&Fraction::name(name), mechanism),
-                    ));
+                    rows.push((name.to_owned(), by_product(&Fraction::name(name), mechanism)));
                 }
             }
         }
@@ -342,22 +339,13 @@ impl Map {
 
     /// Asserts that two maps agree row by row and factor by factor, as rational functions.
     pub fn assert_equals(&self, other: &Self) {
-        let names = |map: &Self| -> BTreeSet<String> {
-            map.rows.iter().map(|(name, _)| name.clone()).collect()
-        };
+        let names = |map: &Self| -> BTreeSet<String> { map.rows.iter().map(|(name, _)| name.clone()).collect() };
         assert_eq!(names(self), names(other), "other parameters are retained");
         for (name, row) in &self.rows {
-            let (_, there) = other
-                .rows
-                .iter()
-                .find(|(n, _)| n == name)
-                .expect("the same names");
+            let (_, there) = other.rows.iter().find(|(n, _)| n == name).expect("the same names");
             let zero = Fraction::number(Rational::ZERO);
             for product in row.keys().chain(there.keys()) {
-                let (a, b) = (
-                    row.get(product).unwrap_or(&zero),
-                    there.get(product).unwrap_or(&zero),
-                );
+                let (a, b) = (row.get(product).unwrap_or(&zero), there.get(product).unwrap_or(&zero));
                 assert!(
                     a == b,
                     "the factor of {product} in {name} is {a:?} here and {b:?} there"
@@ -406,17 +394,15 @@ impl Map {
                 products
                     .iter()
                     .map(|product| {
-                        row.get(product).map_or(FieldElement::ZERO, |f| {
-                            f.value(constants).expect("a regular value")
-                        })
+                        row.get(product)
+                            .map_or(FieldElement::ZERO, |f| f.value(constants).expect("a regular value"))
                     })
                     .collect()
             })
             .collect();
         let mut rank = 0;
         for column in 0..products.len() {
-            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != FieldElement::ZERO)
-            else {
+            let Some(pivot) = (rank..rows.len()).find(|r| rows[*r][column] != FieldElement::ZERO) else {
                 continue;
             };
             rows.swap(rank, pivot);

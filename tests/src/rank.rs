@@ -23,9 +23,6 @@ pub fn rank(mut w: DMatrix<f64>) -> RegressorRank {
 }
 
 /// The numeric rank of all products' columns at some states.
-pub fn rank_of_products(
-    evaluator: &ModelEvaluator<'_>,
-    sample: &Sample,
-) -> Result<RegressorRank, PoseFault> {
+pub fn rank_of_products(evaluator: &ModelEvaluator<'_>, sample: &Sample) -> Result<RegressorRank, PoseFault> {
     evaluator.full_regressor(&sample.states()).map(rank)
 }

@@ -25,11 +25,7 @@ impl Stream {
     /// Uniform in magnitude between `low` and `high`, with a random sign.
     pub fn either_side(&mut self, low: f64, high: f64) -> f64 {
         let magnitude = self.between(low, high);
-        if self.chance(0.5) {
-            -magnitude
-        } else {
-            magnitude
-        }
+        if self.chance(0.5) { -magnitude } else { magnitude }
     }
 
     /// A number below `n`.

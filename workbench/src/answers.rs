@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::sitting::{KeepTrajectoryRequest, PictureRequest, WorkbenchSession};
+use crate::session::{KeepTrajectoryRequest, PictureRequest, WorkbenchSession};
 
 /// A response to a page.
 pub(crate) enum PageResponse {
@@ -106,52 +106,50 @@ struct AddEffectRequest {
 
 /// Answers a request to a session.
 pub(crate) fn answer_request(
-    sitting: &Arc<WorkbenchSession>,
+    session: &Arc<WorkbenchSession>,
     question: &str,
     body: &[u8],
 ) -> Result<PageResponse, RequestRefusal> {
     Ok(PageResponse::Json(match question {
-        "view" => sitting.view(),
+        "view" => session.view(),
         "edit" => {
             let EditRequest { base, text, did } = parse_body(body)?;
-            let told = sitting.edit(base, &text, did.as_deref());
-            told.ok_or_else(|| {
+            let view_json = session.edit(base, &text, did.as_deref());
+            view_json.ok_or_else(|| {
                 let says = "the text was changed in another window";
                 RequestRefusal(RequestFault::Conflict, says.to_owned())
             })?
         }
-        "save" => sitting.save()?,
-        "choose" => sitting.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
+        "save" => session.save()?,
+        "choose" => session.resolve_conflict(parse_body::<ConflictRequest>(body)?.theirs),
         "picture" => {
             return Ok(PageResponse::Svg(
-                sitting.picture(&parse_body::<PictureRequest>(body)?)?,
+                session.picture(&parse_body::<PictureRequest>(body)?)?,
             ));
         }
-        "equations" => return Ok(PageResponse::Html(sitting.equations()?)),
+        "equations" => return Ok(PageResponse::Html(session.equations()?)),
         "compare" => {
             let CompareRequest { places, afresh } = parse_body(body)?;
-            sitting.compare(places, afresh)?
+            session.compare(places, afresh)?
         }
         "curves" => {
             let CurvesRequest { identified } = parse_body(body)?;
-            return Ok(PageResponse::Html(sitting.curves(identified)?));
+            return Ok(PageResponse::Html(session.curves(identified)?));
         }
-        "motion" => sitting.motion()?,
-        "models" => sitting.models(),
-        "variant" => sitting.variant(parse_body::<VariantRequest>(body)?.beside.as_deref())?,
-        "diagnosis" => sitting.diagnosis(),
-        "diagnose" => sitting.diagnose()?,
-        "cancel" => sitting.cancel(),
-        "add" => sitting.add(parse_body::<AddEffectRequest>(body)?.entry)?,
-        "words" => sitting.completions()?,
-        "limits" => sitting.limits()?,
-        "excite" => sitting.excite(parse_body(body)?)?,
-        "excitation" => sitting.excitation(),
-        "stop_excitation" => sitting.stop_excitation(),
-        "trajectory" => sitting.trajectory()?,
-        "keep_trajectory" => {
-            sitting.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?
-        }
+        "motion" => session.motion()?,
+        "models" => session.models(),
+        "variant" => session.variant(parse_body::<VariantRequest>(body)?.beside.as_deref())?,
+        "diagnosis" => session.diagnosis(),
+        "diagnose" => session.diagnose()?,
+        "cancel" => session.cancel(),
+        "add" => session.add(parse_body::<AddEffectRequest>(body)?.entry)?,
+        "words" => session.completions()?,
+        "limits" => session.limits()?,
+        "excite" => session.excite(parse_body(body)?)?,
+        "excitation" => session.excitation(),
+        "stop_excitation" => session.stop_excitation(),
+        "trajectory" => session.trajectory()?,
+        "keep_trajectory" => session.keep_trajectory(&parse_body::<KeepTrajectoryRequest>(body)?)?,
         other => {
             let says = format!("there is no request `{other}`");
             return Err(RequestRefusal(RequestFault::Unknown, says));
@@ -161,6 +159,5 @@ pub(crate) fn answer_request(
 
 /// Reads a JSON body; refuses one that does not fit the request.
 pub(crate) fn parse_body<T: DeserializeOwned>(body: &[u8]) -> Result<T, RequestRefusal> {
-    serde_json::from_slice(body)
-        .map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
+    serde_json::from_slice(body).map_err(|error| RequestRefusal(RequestFault::Malformed, error.to_string()))
 }

@@ -8,8 +8,8 @@ use modelmill::files::{self, FileSource};
 use serde_json::Value;
 use tokio::sync::watch;
 
-use crate::fence::FileAccessPolicy;
-use crate::surroundings::SessionEnvironment;
+use crate::file_access::FileAccessPolicy;
+use crate::surrounding_files::SessionEnvironment;
 
 /// Bytes of stack for long work, as the program itself has.
 pub(crate) const STACK: usize = 16 << 20;
@@ -17,7 +17,7 @@ pub(crate) const STACK: usize = 16 << 20;
 /// The part of this machine that a session may use.
 pub(crate) struct LocalMachine {
     /// The files that may be read.
-    fence: Arc<FileAccessPolicy>,
+    file_access: Arc<FileAccessPolicy>,
     /// Zero of the clock.
     since: Instant,
     /// Last version of the session, for waiting pages.
@@ -26,9 +26,9 @@ pub(crate) struct LocalMachine {
 
 impl LocalMachine {
     /// Files are read under the policy `fence`.
-    pub(crate) fn new(fence: Arc<FileAccessPolicy>) -> Self {
+    pub(crate) fn new(file_access: Arc<FileAccessPolicy>) -> Self {
         Self {
-            fence,
+            file_access,
             since: Instant::now(),
             changes: watch::channel(0).0,
         }
@@ -42,7 +42,7 @@ impl LocalMachine {
 
 impl SessionEnvironment for LocalMachine {
     fn files(&self) -> Arc<dyn FileSource> {
-        Arc::clone(&self.fence) as _
+        Arc::clone(&self.file_access) as _
     }
 
     fn write(&self, path: &Path, bytes: &[u8]) -> Result<(), String> {

@@ -17,8 +17,8 @@ use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::http::header::{
-    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN,
-    REFERRER_POLICY, X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
+    CACHE_CONTROL, CONTENT_SECURITY_POLICY, CONTENT_TYPE, HOST, HeaderName, HeaderValue, ORIGIN, REFERRER_POLICY,
+    X_CONTENT_TYPE_OPTIONS, X_FRAME_OPTIONS,
 };
 use axum::middleware::{self, Next};
 use axum::response::{Html, IntoResponse, Response};
@@ -32,7 +32,7 @@ use tokio::net::TcpListener;
 use crate::answers::{PageResponse, RequestRefusal, answer_request};
 use crate::machine::{LocalMachine, STACK};
 use crate::page;
-use crate::sitting::{LONGEST, WorkbenchSession};
+use crate::session::{LONGEST, WorkbenchSession};
 
 /// Header with the token, by which the page proves that it was opened with the link.
 const TOKEN: HeaderName = HeaderName::from_static("x-modelmill-token");
@@ -45,7 +45,7 @@ const NEWS_TIMEOUT: Duration = Duration::from_secs(20);
 /// State that all handlers share.
 struct ServerState {
     /// The session of the model file.
-    sitting: Arc<WorkbenchSession>,
+    session: Arc<WorkbenchSession>,
     /// This machine; it signals changes to waiting pages.
     machine: Arc<LocalMachine>,
     /// Token of the link, 32 hexadecimal digits.
@@ -58,7 +58,7 @@ struct ServerState {
 ///
 /// Fails if the port is in use.
 pub(crate) fn serve(
-    sitting: Arc<WorkbenchSession>,
+    session: Arc<WorkbenchSession>,
     machine: Arc<LocalMachine>,
     port: u16,
     opened: impl FnOnce(&str),
@@ -80,9 +80,9 @@ pub(crate) fn serve(
         let port = listener.local_addr().map_err(taken)?.port();
         let token = random_token().map_err(Error::input)?;
         let link = format!("http://127.0.0.1:{port}/?token={token}");
-        tokio::spawn(poll_files(Arc::clone(&sitting)));
+        tokio::spawn(poll_files(Arc::clone(&session)));
         let app = Arc::new(ServerState {
-            sitting,
+            session,
             machine,
             token,
             port,
@@ -97,18 +97,17 @@ pub(crate) fn serve(
 /// 128 random bits in hexadecimal digits.
 fn random_token() -> Result<String, String> {
     let mut bytes = [0_u8; 16];
-    getrandom::fill(&mut bytes)
-        .map_err(|error| format!("no random token is available: {error}"))?;
+    getrandom::fill(&mut bytes).map_err(|error| format!("no random token is available: {error}"))?;
     Ok(format!("{:032x}", u128::from_le_bytes(bytes)))
 }
 
 /// Checks the files for changes by other programs, as long as the server runs.
-async fn poll_files(sitting: Arc<WorkbenchSession>) {
+async fn poll_files(session: Arc<WorkbenchSession>) {
     loop {
         tokio::time::sleep(POLL_INTERVAL).await;
-        let sitting = Arc::clone(&sitting);
+        let session = Arc::clone(&session);
         // A failure is ignored here: the next check repeats it.
-        let _ = tokio::task::spawn_blocking(move || sitting.check_disk()).await;
+        let _ = tokio::task::spawn_blocking(move || session.check_disk()).await;
     }
 }
 
@@ -129,10 +128,7 @@ fn router(app: Arc<ServerState>) -> Router {
 async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let refused = |says: &'static str| (StatusCode::FORBIDDEN, says).into_response();
-    let names = [
-        format!("127.0.0.1:{}", app.port),
-        format!("localhost:{}", app.port),
-    ];
+    let names = [format!("127.0.0.1:{}", app.port), format!("localhost:{}", app.port)];
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     if !text(HOST).is_some_and(|host| names.iter().any(|name| name == host)) {
         return refused("This server answers under 127.0.0.1 only.\n");
@@ -151,16 +147,12 @@ async fn guard(State(app): State<Arc<ServerState>>, request: Request, next: Next
     let given = if is_page {
         let query = request.uri().query().unwrap_or_default();
         let mut pairs = query.split('&').filter_map(|pair| pair.split_once('='));
-        pairs
-            .find(|(name, _)| *name == "token")
-            .map(|(_, value)| value)
+        pairs.find(|(name, _)| *name == "token").map(|(_, value)| value)
     } else {
         text(TOKEN)
     };
     if !given.is_some_and(|given| is_same_token(given, &app.token)) {
-        return refused(
-            "The token is missing or wrong. Open the link that `modelmill work` printed.\n",
-        );
+        return refused("The token is missing or wrong. Open the link that `modelmill work` printed.\n");
     }
     let mut response = next.run(request).await;
     let own = [
@@ -206,8 +198,8 @@ async fn run_blocking<T: Send + 'static>(
     app: &ServerState,
     work: impl FnOnce(&Arc<WorkbenchSession>) -> T + Send + 'static,
 ) -> Result<T, HttpRefusal> {
-    let sitting = Arc::clone(&app.sitting);
-    let done = tokio::task::spawn_blocking(move || work(&sitting)).await;
+    let session = Arc::clone(&app.session);
+    let done = tokio::task::spawn_blocking(move || work(&session)).await;
     done.map_err(|_| {
         HttpRefusal(
             StatusCode::INTERNAL_SERVER_ERROR,
@@ -240,16 +232,13 @@ struct SinceQuery {
 }
 
 /// Sends the current view once its version differs from that of the page, or after [`NEWS_TIMEOUT`].
-async fn view(
-    State(app): State<Arc<ServerState>>,
-    Query(SinceQuery { since }): Query<SinceQuery>,
-) -> HandlerResult {
+async fn view(State(app): State<Arc<ServerState>>, Query(SinceQuery { since }): Query<SinceQuery>) -> HandlerResult {
     let mut changes = app.machine.changes();
     let news = changes.wait_for(|version| *version != since);
     // After the timeout the page gets the view that it already has, and requests the next one.
     let _ = tokio::time::timeout(NEWS_TIMEOUT, news).await;
-    let told = run_blocking(&app, |sitting| sitting.view()).await?;
-    Ok(Json(told).into_response())
+    let view_json = run_blocking(&app, |session| session.view()).await?;
+    Ok(Json(view_json).into_response())
 }
 
 /// Answers all other requests, by their names.
@@ -258,12 +247,9 @@ async fn handle_request(
     Path(question): Path<String>,
     body: Bytes,
 ) -> HandlerResult {
-    let found = run_blocking(&app, move |sitting| {
-        answer_request(sitting, &question, &body)
-    })
-    .await?;
+    let found = run_blocking(&app, move |session| answer_request(session, &question, &body)).await?;
     Ok(match found? {
-        PageResponse::Json(told) => Json(told).into_response(),
+        PageResponse::Json(view_json) => Json(view_json).into_response(),
         PageResponse::Svg(svg) => ([(CONTENT_TYPE, "image/svg+xml")], svg).into_response(),
         PageResponse::Html(html) => Html(html).into_response(),
     })
@@ -278,10 +264,7 @@ mod tests {
         let [a, b] = [(); 2].map(|()| random_token().unwrap());
         assert!(a.len() == 32 && a != b);
         assert!(
-            is_same_token(&a, &a)
-                && !is_same_token(&a, &b)
-                && !is_same_token("", &a)
-                && !is_same_token(&a[1..], &a)
+            is_same_token(&a, &a) && !is_same_token(&a, &b) && !is_same_token("", &a) && !is_same_token(&a[1..], &a)
         );
     }
 }

@@ -72,27 +72,23 @@ impl VariantCache {
         read: impl FnOnce() -> Outcome<SessionRecordings>,
         after_read: impl FnOnce() -> Outcome<Arc<SessionRecordings>>,
     ) -> Outcome<Value> {
-        let mut told = ModelChanges::from_models(before, after).json(before, after);
+        let mut view_json = ModelChanges::from_models(before, after).json(before, after);
         let along = (|| {
             VariantComparison::check([before, after])?;
             let first = self.readings.recordings_for(before, false, read)?.0;
             let second = after_read()?;
-            let runs = [&first, &second]
-                .map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
+            let runs = [&first, &second].map(|read| read.iter().flatten().collect::<Vec<&PreparedRecording>>());
             if runs[0].is_empty() {
                 return Ok(Value::Null);
             }
-            Ok(
-                VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?
-                    .json(spelling),
-            )
+            Ok(VariantComparison::along_recordings([before, after], [&runs[0], &runs[1]])?.json(spelling))
         })();
         match along {
-            Ok(along) => told["along"] = along,
+            Ok(along) => view_json["along"] = along,
             Err(Error::Cancelled) => return Err(Error::Cancelled),
-            Err(error) => told["refused"] = json!(error.spell(spelling)),
+            Err(error) => view_json["refused"] = json!(error.spell(spelling)),
         }
-        Ok(told)
+        Ok(view_json)
     }
 }
 
@@ -115,7 +111,5 @@ pub(crate) fn models_in_folder(host: &Host, model: &Path) -> Vec<String> {
 /// Contents of all files of a model; `None` for a file that cannot be read.
 fn file_contents(host: &Host, model: &Model) -> Vec<Option<Vec<u8>>> {
     let paths = model.files();
-    paths
-        .map(|path| host.files().read(path, LONGEST).ok())
-        .collect()
+    paths.map(|path| host.files().read(path, LONGEST).ok()).collect()
 }

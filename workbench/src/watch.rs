@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use modelmill::progress::{JobHandle, ProgressListener};
 use serde_json::{Value, json};
 
-use crate::surroundings::SessionEnvironment;
+use crate::surrounding_files::SessionEnvironment;
 
 /// Watches the jobs of one diagnosis or search.
 pub(crate) struct JobWatch {
@@ -87,7 +87,7 @@ impl ProgressListener for JobWatch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shelf::MemoryStore;
+    use crate::memory_store::MemoryStore;
 
     #[test]
     fn what_is_cancelled_stops_every_job() {

@@ -168,10 +168,7 @@ mod tests {
             assert_eq!((a * b) * c, a * (b * c));
             assert_eq!(a * a.inverse().unwrap(), ExtensionElement::ONE);
             assert_eq!((a - b) + b, a);
-            assert_eq!(
-                a.integer_power(-3).unwrap() * a * a * a,
-                ExtensionElement::ONE
-            );
+            assert_eq!(a.integer_power(-3).unwrap() * a * a * a, ExtensionElement::ONE);
         }
         assert_eq!(ExtensionElement::<MODULUS>::ZERO.inverse(), None);
     }

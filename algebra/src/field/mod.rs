@@ -68,9 +68,7 @@ impl<const P: u64> FieldElement<P> {
         }
         let big = value.to_big();
         let reduce = |n: &BigInt| {
-            let magnitude = (n.abs() % BigInt::from(P))
-                .to_u64()
-                .expect("a remainder fits");
+            let magnitude = (n.abs() % BigInt::from(P)).to_u64().expect("a remainder fits");
             if n.is_negative() {
                 -Self(magnitude)
             } else {
@@ -252,11 +250,8 @@ mod tests {
     fn laws<const P: u64>() {
         let mut stream = RandomStream::new(7);
         for _ in 0..500 {
-            let (a, b, c): (FieldElement<P>, FieldElement<P>, FieldElement<P>) = (
-                stream.next_element(),
-                stream.next_element(),
-                stream.next_element(),
-            );
+            let (a, b, c): (FieldElement<P>, FieldElement<P>, FieldElement<P>) =
+                (stream.next_element(), stream.next_element(), stream.next_element());
             assert_eq!(a * (b + c), a * b + a * c);
             assert_eq!((a - b) + b, a);
             assert_eq!(a * a.inverse().unwrap(), FieldElement::ONE);

@@ -126,9 +126,7 @@ impl FileSource for DiskFiles {
                 let file = File::open(path).map_err(fail)?;
                 OpenFile::Memory(read_capped(file, path, most)?.into())
             }
-            PathKind::Stream => {
-                OpenFile::Memory(read_pipe_with_timeout(path, most, self.pipe_timeout)?.into())
-            }
+            PathKind::Stream => OpenFile::Memory(read_pipe_with_timeout(path, most, self.pipe_timeout)?.into()),
             PathKind::Folder => return Err(FileError::new(path, FileFault::Folder)),
             PathKind::Device | PathKind::Missing => {
                 return Err(FileError::new(path, FileFault::Device));
@@ -169,9 +167,7 @@ fn is_standard_input(path: &Path) -> bool {
 
 /// Whether a path is a descriptor that the shell has opened.
 fn is_handed_over(path: &Path) -> bool {
-    path == Path::new("/dev/stdin")
-        || path.starts_with("/dev/fd")
-        || path.starts_with("/proc/self/fd")
+    path == Path::new("/dev/stdin") || path.starts_with("/dev/fd") || path.starts_with("/proc/self/fd")
 }
 
 /// All bytes of a stream; fails when there are more than `most`.
@@ -193,11 +189,7 @@ fn read_capped(stream: impl Read, path: &Path, most: u64) -> Result<Vec<u8>, Fil
 /// All bytes of a named pipe. A thread reads them; without a writer that thread waits forever.
 ///
 /// Fails after `patience` without bytes, or when there are more than `most`.
-fn read_pipe_with_timeout(
-    path: &Path,
-    most: u64,
-    patience: Duration,
-) -> Result<Vec<u8>, FileError> {
+fn read_pipe_with_timeout(path: &Path, most: u64, patience: Duration) -> Result<Vec<u8>, FileError> {
     // The channel is short, so that the thread cannot read far ahead.
     let (sender, receiver) = sync_channel(4);
     let pipe = path.to_owned();
@@ -251,9 +243,7 @@ fn identity(path: &Path) -> Option<FileIdentity> {
     use std::os::unix::fs::MetadataExt;
     let found = path.metadata().ok()?;
     // Terminals and similar devices may be read and written at the same time.
-    found
-        .is_file()
-        .then(|| FileIdentity::Number(found.dev(), found.ino()))
+    found.is_file().then(|| FileIdentity::Number(found.dev(), found.ino()))
 }
 
 #[cfg(not(unix))]
@@ -280,13 +270,7 @@ mod tests {
 
         fn pipe(&self) -> PathBuf {
             let path = self.0.join("pipe");
-            assert!(
-                Command::new("mkfifo")
-                    .arg(&path)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
+            assert!(Command::new("mkfifo").arg(&path).status().unwrap().success());
             path
         }
 
@@ -395,10 +379,7 @@ mod tests {
     #[test]
     fn devices_are_written_to_as_they_are() {
         write(Path::new("/dev/null"), b"gone").unwrap();
-        assert_eq!(
-            DiskFiles::default().kind(Path::new("/dev/null")),
-            PathKind::Device
-        );
+        assert_eq!(DiskFiles::default().kind(Path::new("/dev/null")), PathKind::Device);
         #[cfg(target_os = "linux")]
         {
             let full = write(Path::new("/dev/full"), b"none").unwrap_err();

@@ -92,12 +92,10 @@ impl FileFault {
             Self::NoList => "name the files one by one",
             Self::Input => "choose another name",
             Self::System { kind, .. } => match kind {
-                io::ErrorKind::PermissionDenied => {
-                    "check the permissions of the file and its folder"
+                io::ErrorKind::PermissionDenied => "check the permissions of the file and its folder",
+                io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+                    "make room, or choose another place"
                 }
-                io::ErrorKind::StorageFull
-                | io::ErrorKind::QuotaExceeded
-                | io::ErrorKind::FileTooLarge => "make room, or choose another place",
                 _ => "check that the folder exists and may be read and written to",
             },
         }

@@ -31,8 +31,7 @@ impl MemoryFiles {
 
     /// Adds a file, which replaces a file of the same path.
     pub fn insert(&mut self, path: impl AsRef<Path>, bytes: impl Into<Vec<u8>>) {
-        self.files
-            .insert(normalise_path(path.as_ref()), Arc::new(bytes.into()));
+        self.files.insert(normalise_path(path.as_ref()), Arc::new(bytes.into()));
     }
 
     /// The contents of a file of at most `most` bytes.

@@ -53,9 +53,7 @@ fn resolve_links(path: &Path) -> io::Result<PathBuf> {
             Err(_) => return Ok(path),
         }
     }
-    Err(io::Error::other(
-        "too many symbolic links lead to each other",
-    ))
+    Err(io::Error::other("too many symbolic links lead to each other"))
 }
 
 /// A new file that is removed again unless it is kept.

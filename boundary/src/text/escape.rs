@@ -24,10 +24,7 @@ pub fn html(text: &str) -> Cow<'_, str> {
 /// ```
 pub fn markdown(text: &str) -> Cow<'_, str> {
     escape_characters(plain(text), |c, out| {
-        if matches!(
-            c,
-            '\\' | '`' | '*' | '_' | '|' | '<' | '$' | '[' | ']' | '&' | '~'
-        ) {
+        if matches!(c, '\\' | '`' | '*' | '_' | '|' | '<' | '$' | '[' | ']' | '&' | '~') {
             out.push('\\');
         }
         out.push(c);
@@ -118,15 +115,12 @@ pub fn csv_field(text: &str) -> Cow<'_, str> {
 /// The original name of a field that [`csv_field`] wrote, without quotes.
 pub fn csv_name(field: &str) -> &str {
     let unmarked = field.strip_prefix('\'');
-    unmarked
-        .filter(|text| is_spreadsheet_formula(text))
-        .unwrap_or(field)
+    unmarked.filter(|text| is_spreadsheet_formula(text)).unwrap_or(field)
 }
 
 /// Whether a spreadsheet would read a text as a formula, or such a text is marked already.
 fn is_spreadsheet_formula(text: &str) -> bool {
-    text.trim_start_matches('\'')
-        .starts_with(['=', '+', '-', '@'])
+    text.trim_start_matches('\'').starts_with(['=', '+', '-', '@'])
 }
 
 /// JSON that a terminal can show: harmful characters in strings are written as `\u` and four digits, with the same

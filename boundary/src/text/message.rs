@@ -278,14 +278,11 @@ mod tests {
             0.125,
             "option `prior`"
         );
-        let expected =
-            format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
+        let expected = format!("{file}: give <identify> with BETWEEN(1,2), 0.12 of \"option `prior`\"");
         assert_eq!(message.spell(&UpperCase), expected);
         assert_eq!(
             message.in_library_words(),
-            format!(
-                "{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\""
-            )
+            format!("{file}: give verb `identify` with option `between` = `1,2`, 0.12 of \"option `prior`\"")
         );
     }
 

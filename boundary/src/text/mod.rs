@@ -61,9 +61,9 @@ fn colour_mark_length(text: &str) -> Option<usize> {
     let numbers = text.strip_prefix("\u{1b}[")?;
     let end = numbers.find(|c: char| !c.is_ascii_digit() && c != ';')?;
     // Allowed are styles that show the text, and the usual colours.
-    let is_shown = numbers[..end].split(';').all(|n| {
-        matches!(n.parse::<u8>(), Ok(0..=4 | 22..=24 | 30..=39 | 90..=97)) || n.is_empty()
-    });
+    let is_shown = numbers[..end]
+        .split(';')
+        .all(|n| matches!(n.parse::<u8>(), Ok(0..=4 | 22..=24 | 30..=39 | 90..=97)) || n.is_empty());
     (numbers[end..].starts_with('m') && is_shown).then_some(2 + end + 1)
 }
 
@@ -139,10 +139,7 @@ mod tests {
     fn colours_reach_a_terminal_that_wants_them_and_nothing_else_does() {
         let red = "\u{1b}[1;31mred\u{1b}[0m\tnext\r\nline";
         assert_eq!(terminal(red, true), "\u{1b}[1;31mred\u{1b}[0m\tnext\nline");
-        assert_eq!(
-            terminal(red, false),
-            "\u{fffd}[1;31mred\u{fffd}[0m\tnext\nline"
-        );
+        assert_eq!(terminal(red, false), "\u{fffd}[1;31mred\u{fffd}[0m\tnext\nline");
         for other in [
             "\u{1b}[8mhidden",
             "\u{1b}[2Jcleared",
@@ -156,10 +153,7 @@ mod tests {
 
     #[test]
     fn ordinary_text_is_not_even_copied() {
-        for text in [
-            "",
-            "m1 = 3 kg, \u{3b8}\u{307} \u{2013} \u{65e5}\u{672c} \u{1f980}",
-        ] {
+        for text in ["", "m1 = 3 kg, \u{3b8}\u{307} \u{2013} \u{65e5}\u{672c} \u{1f980}"] {
             assert!(matches!(plain(text), Cow::Borrowed(_)));
             assert!(matches!(html(text), Cow::Borrowed(_)));
             assert!(matches!(comment(text), Cow::Borrowed(_)));

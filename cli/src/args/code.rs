@@ -43,11 +43,7 @@ pub(crate) struct GenerateArgs {
     /// Model file (TOML)
     pub(crate) model: PathBuf,
     /// Write the source to this file instead of standard output; with --language c99, c or python, files to this folder
-    #[arg(
-        long,
-        value_name = "FILE.rs|DIR",
-        required_if_eq_any(languages_in_folders())
-    )]
+    #[arg(long, value_name = "FILE.rs|DIR", required_if_eq_any(languages_in_folders()))]
     pub(crate) out: Option<PathBuf>,
     /// With the equation of motion: mass matrix, velocity terms, gravity, forward dynamics
     #[arg(long)]
@@ -76,9 +72,7 @@ fn languages() -> impl TypedValueParser<Value = CodeLanguage> {
 /// Languages that write several files, as pairs of option and value. With these `--out` is required.
 fn languages_in_folders() -> Vec<(&'static str, &'static str)> {
     let others = CodeLanguage::all().filter(|language| language.form() != LanguageForm::Module);
-    others
-        .map(|language| ("language", language.name()))
-        .collect()
+    others.map(|language| ("language", language.name())).collect()
 }
 
 /// `atlas`.

@@ -32,22 +32,14 @@ pub(crate) struct DrawingArgs {
 
 impl DrawingArgs {
     /// The target of `--picture`, if given. Refuses a path that is one of `inputs`, the files that the command reads.
-    pub(crate) fn target<'a>(
-        &self,
-        inputs: impl IntoIterator<Item = &'a Path>,
-    ) -> CommandOutcome<Option<OutputFile>> {
+    pub(crate) fn target<'a>(&self, inputs: impl IntoIterator<Item = &'a Path>) -> CommandOutcome<Option<OutputFile>> {
         let path = self.picture.as_ref();
         path.map(|path| OutputFile::for_flag("--picture", path, inputs))
             .transpose()
     }
 
     /// Draws a model and writes the SVG; with `before`, this other model is drawn as well.
-    pub(crate) fn draw(
-        &self,
-        target: &OutputFile,
-        model: &Model,
-        before: Option<&Model>,
-    ) -> CommandOutcome {
+    pub(crate) fn draw(&self, target: &OutputFile, model: &Model, before: Option<&Model>) -> CommandOutcome {
         // Angles are in degrees on the command line and in rad in the library.
         let drawing = PictureOptions {
             at: self.at.clone(),

@@ -28,8 +28,8 @@ use work::WorkArgs;
 
 pub(crate) use code::{AtlasArgs, EquationsArgs, EquationsFormat, GenerateArgs};
 pub(crate) use data::{
-    AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs,
-    ParameterSource, RecordingsArgs, ReportArgs,
+    AdoptArgs, CompareArgs, DiagnoseArgs, DiagnosisArgs, EvaluateArgs, IdentifyArgs, InterpretArgs, ParameterSource,
+    RecordingsArgs, ReportArgs,
 };
 #[cfg(feature = "experiment")]
 pub(crate) use experiment::ExperimentArgs;
@@ -261,10 +261,8 @@ pub(crate) enum ProgramCommand {
         modelmill completions fish > ~/.config/fish/completions/modelmill.fish")]
     Completions(CompletionsArgs),
     /// Show all main steps on bundled recordings: derive, compare, find the missing effect, add it, identify again
-    #[command(
-        after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
-        Models, recordings and pages are written into the folder, so that each command of the tour can be repeated."
-    )]
+    #[command(after_help = "Examples:\n  modelmill tour\n  modelmill tour --out tour\n\n\
+        Models, recordings and pages are written into the folder, so that each command of the tour can be repeated.")]
     Tour(TourArgs),
 }
 

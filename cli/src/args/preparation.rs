@@ -3,9 +3,7 @@
 use std::fmt::Write as _;
 
 use clap::{Args, ValueEnum};
-use modelmill::recording::{
-    DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation,
-};
+use modelmill::recording::{DerivativeSource, MAX_FILTER_ORDER, RecordingOptions, SmoothingMethod, StatePreparation};
 
 use crate::flags::quote_word;
 
@@ -114,33 +112,18 @@ impl PreparationArgs {
         let number = |value: Option<f64>| value.map(|value| value.to_string());
         option("cutoff", number(self.cutoff));
         option("order", self.order.map(|order| order.to_string()));
-        option(
-            "trim",
-            self.trim.map(|(start, end)| format!("{start},{end}")),
-        );
-        option(
-            "decimate",
-            (self.decimate > 1).then(|| self.decimate.to_string()),
-        );
+        option("trim", self.trim.map(|(start, end)| format!("{start},{end}")));
+        option("decimate", (self.decimate > 1).then(|| self.decimate.to_string()));
         // Values of enumerations by their names, except the defaults.
         let choice = |value: Option<clap::builder::PossibleValue>, usual: &str| {
             let name = value.map(|value| value.get_name().to_owned());
             name.filter(|name| name != usual)
         };
-        option(
-            "derivatives",
-            choice(self.derivatives.to_possible_value(), "recorded"),
-        );
-        option(
-            "smoothing",
-            choice(self.smoothing.to_possible_value(), "auto"),
-        );
+        option("derivatives", choice(self.derivatives.to_possible_value(), "recorded"));
+        option("smoothing", choice(self.smoothing.to_possible_value(), "auto"));
         option("period", number(self.period));
         option("band", number(self.band));
-        option(
-            "between",
-            self.between.map(|(from, to)| format!("{from},{to}")),
-        );
+        option("between", self.between.map(|(from, to)| format!("{from},{to}")));
         if self.skip_bad_samples {
             all.push_str(" --skip-bad-samples");
         }
@@ -170,9 +153,7 @@ impl PreparationArgs {
                 },
                 SmoothingArg::Butterworth => SmoothingMethod::Butterworth,
                 SmoothingArg::SavitzkyGolay => SmoothingMethod::SavitzkyGolay,
-                SmoothingArg::Fourier => SmoothingMethod::Fourier {
-                    period: self.period,
-                },
+                SmoothingArg::Fourier => SmoothingMethod::Fourier { period: self.period },
             },
             ..StatePreparation::default()
         }
@@ -209,18 +190,16 @@ fn parse_period(text: &str) -> Result<f64, String> {
 fn parse_order(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(order) if (1..=MAX_FILTER_ORDER).contains(&order) => Ok(order),
-        _ => Err(format!(
-            "expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual"
-        )),
+        _ => Err(format!("expected an order from 1 to {MAX_FILTER_ORDER}; 4 is usual")),
     }
 }
 
 /// Reads `N` for both ends or `START,END`, numbers of samples.
 fn parse_trim(text: &str) -> Result<(usize, usize), String> {
     let count = |text: &str| {
-        text.trim().parse::<usize>().map_err(|_| {
-            "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned()
-        })
+        text.trim()
+            .parse::<usize>()
+            .map_err(|_| "expected a number of samples, such as 49, or two of them, such as 49,10".to_owned())
     };
     match text.split_once(',') {
         Some((start, end)) => Ok((count(start)?, count(end)?)),

@@ -75,11 +75,7 @@ pub(crate) fn run(host: &Host, args: &AddArgs) -> CommandOutcome {
 }
 
 /// Reads the new text as a file at the target, since relative paths in it start from the folder of the file.
-fn reload_at_target(
-    host: &Host,
-    edited: EditedModel,
-    target: Option<&OutputFile>,
-) -> CommandOutcome<EditedModel> {
+fn reload_at_target(host: &Host, edited: EditedModel, target: Option<&OutputFile>) -> CommandOutcome<EditedModel> {
     let Some(target) = target else {
         return Ok(edited);
     };

@@ -15,9 +15,7 @@ use crate::{commands, terminal};
 /// file.
 pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     let model = commands::model(host, &args.model)?;
-    let inputs = model
-        .files()
-        .chain(std::iter::once::<&Path>(args.fit.as_ref()));
+    let inputs = model.files().chain(std::iter::once::<&Path>(args.fit.as_ref()));
     let target = args
         .out
         .as_ref()
@@ -63,7 +61,9 @@ pub(crate) fn run(host: &Host, args: &AdoptArgs) -> CommandOutcome {
     terminal::print(&edit::colour_diff(&difference, terminal::style()))?;
     terminal::note(&match written {
         Some(name) => format!("{name} is written; its nominal values are now those of the fit"),
-        None => "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned(),
+        None => {
+            "nothing is written; add --in-place to change the model file, or --out FILE to write another one".to_owned()
+        }
     });
     Ok(())
 }

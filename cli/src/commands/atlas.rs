@@ -75,10 +75,7 @@ pub(crate) fn run(host: &Host, args: &AtlasArgs) -> CommandOutcome {
     }
     // Table and page go into the folder itself, next to the folder of pictures.
     let write = |name: &str, text: &str| {
-        let target = OutputFile::new(
-            &args.out.join(name),
-            args.models.iter().map(PathBuf::as_path),
-        )?;
+        let target = OutputFile::new(&args.out.join(name), args.models.iter().map(PathBuf::as_path))?;
         target.write(text)
     };
     write(TABLE, &atlas::page(&entries))?;

@@ -14,10 +14,7 @@ pub(crate) fn run(host: &Host, args: &CheckArgs) -> CommandOutcome {
             // Editors read faults as JSON from standard output, in addition to the text on standard error.
             let told = match &fault {
                 Error::Model(faults) => print::faults(faults, &FlagSpelling),
-                fault => print::refusal(
-                    &fault.spell(&FlagSpelling),
-                    &args.model.display().to_string(),
-                ),
+                fault => print::refusal(&fault.spell(&FlagSpelling), &args.model.display().to_string()),
             };
             terminal::print_json(&told)?;
             return Err(CommandFailure::Library(fault));

@@ -17,9 +17,7 @@ use crate::{commands, terminal};
 pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
     let before = commands::model(host, &args.before)?;
     // Remarks on the second model would repeat those on the first; the listener drops them.
-    let quiet = host
-        .clone()
-        .with_progress(Arc::new(ProgressWithoutRemarks::new()));
+    let quiet = host.clone().with_progress(Arc::new(ProgressWithoutRemarks::new()));
     let after = commands::model(&quiet, &args.after)?;
     let inputs = before.files().chain(after.files());
     if let Some(target) = args.drawing.target(inputs)? {
@@ -44,11 +42,7 @@ pub(crate) fn run(host: &Host, args: &DiffArgs) -> CommandOutcome {
 }
 
 /// Compares both models along the recordings; none without `--data`.
-fn variants(
-    args: &DiffArgs,
-    before: &Model,
-    after: &Model,
-) -> CommandOutcome<Option<VariantComparison>> {
+fn variants(args: &DiffArgs, before: &Model, after: &Model) -> CommandOutcome<Option<VariantComparison>> {
     if args.data.is_empty() {
         return Ok(None);
     }

@@ -26,9 +26,6 @@ pub(crate) fn run(host: &Host, args: &EffectsArgs) -> CommandOutcome {
     }
     let mut lines = effects::kind_table(&kinds);
     lines.push(String::new());
-    lines.push(
-        "`modelmill effects KIND` explains one; `modelmill add MODEL KIND --at PLACE` adds it."
-            .to_owned(),
-    );
+    lines.push("`modelmill effects KIND` explains one; `modelmill add MODEL KIND --at PLACE` adds it.".to_owned());
     terminal::print(&lines.join("\n"))
 }

@@ -16,11 +16,7 @@ pub(crate) fn run(host: &Host, args: &EquationsArgs) -> CommandOutcome {
         .as_ref()
         .map(|path| OutputFile::new(path, model.files()))
         .transpose()?;
-    let format = if args.json {
-        EquationsFormat::Json
-    } else {
-        args.format
-    };
+    let format = if args.json { EquationsFormat::Json } else { args.format };
     // Long expressions can take seconds.
     let written = match format {
         EquationsFormat::Text => model.equations(PageFormat::Text),

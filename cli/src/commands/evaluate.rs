@@ -48,11 +48,7 @@ pub(crate) fn run(host: &Host, args: &EvaluateArgs) -> CommandOutcome {
         Some(target) => {
             target.write(&found.csv())?;
             // The note lists the columns that were written.
-            let names: Vec<&str> = found
-                .columns
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
+            let names: Vec<&str> = found.columns.iter().map(|(name, _)| name.as_str()).collect();
             terminal::note(&format!(
                 "{}: {} of {}",
                 target.path().display(),

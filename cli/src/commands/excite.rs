@@ -15,15 +15,12 @@ use crate::{commands, terminal};
 
 /// Searches for the trajectory, and writes it (CSV) and its picture (SVG).
 pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
-    let model = args
-        .parameters
-        .apply_to(host, commands::model(host, &args.model)?)?;
+    let model = args.parameters.apply_to(host, commands::model(host, &args.model)?)?;
     let target = OutputFile::new(&args.out, model.files())?;
     let figure = OutputFile::new(&figure_path(args), model.files())?;
     if figure.path() == target.path() {
         return Err(CommandFailure::Usage(
-            "--out and --figure name the same file; the trajectory is CSV, the picture SVG"
-                .to_owned(),
+            "--out and --figure name the same file; the trajectory is CSV, the picture SVG".to_owned(),
         ));
     }
     // Recordings are needed only for --separate, to estimate effect and noise.
@@ -48,9 +45,7 @@ pub(crate) fn run(host: &Host, args: &ExciteArgs) -> CommandOutcome {
 
 /// Path of the picture: `--figure`, or the path of the trajectory with the ending `.svg`.
 fn figure_path(args: &ExciteArgs) -> PathBuf {
-    args.figure
-        .clone()
-        .unwrap_or_else(|| args.out.with_extension("svg"))
+    args.figure.clone().unwrap_or_else(|| args.out.with_extension("svg"))
 }
 
 impl ExciteArgs {

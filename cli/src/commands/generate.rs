@@ -15,10 +15,7 @@ use crate::{commands, terminal};
 
 /// Writes the source that `cargo build` generates from the model, or a folder of sources, or a crate.
 pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
-    let more = [
-        ("--reactions", args.reactions),
-        ("--self-test", args.self_test),
-    ];
+    let more = [("--reactions", args.reactions), ("--self-test", args.self_test)];
     // Some parts of the code exist for Rust only.
     if let Some((flag, _)) = more.iter().find(|(_, asked)| *asked)
         && !args.language.has_all()
@@ -57,10 +54,7 @@ pub(crate) fn run(host: &Host, args: &GenerateArgs) -> CommandOutcome {
         ));
     };
     write_crate(folder, &files)?;
-    terminal::note(&format!(
-        "{}: a crate that builds {makes}",
-        folder.display()
-    ));
+    terminal::note(&format!("{}: a crate that builds {makes}", folder.display()));
     Ok(())
 }
 
@@ -89,12 +83,8 @@ fn write_sources(args: &GenerateArgs, inputs: &[&Path], files: &[EmittedFile]) -
         ));
     };
     refuse_dash("--out", folder)?;
-    std::fs::create_dir_all(folder).map_err(|error| {
-        CommandFailure::Input(format!(
-            "folder {} cannot be created: {error}",
-            folder.display()
-        ))
-    })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|error| CommandFailure::Input(format!("folder {} cannot be created: {error}", folder.display())))?;
     for file in files {
         OutputFile::new(&folder.join(&file.path), inputs.iter().copied())?.write(&file.text)?;
     }
@@ -118,8 +108,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
         .read_text(&manifest, 1 << 20)
         .is_ok_and(|text| text.starts_with(MANIFEST_HEADER));
     // A new or empty folder is accepted, and one with a manifest of this program.
-    let occupied = folder.is_file()
-        || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    let occupied = folder.is_file() || std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !ours {
         return Err(CommandFailure::Usage(format!(
             "--out {}: the folder has files that modelmill did not write; give the name of a new folder",
@@ -131,10 +120,7 @@ fn write_crate(folder: &Path, files: &[EmittedFile]) -> CommandOutcome {
         let path = folder.join(&file.path);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|error| {
-            CommandFailure::Input(format!(
-                "folder {} cannot be created: {error}",
-                parent.display()
-            ))
+            CommandFailure::Input(format!("folder {} cannot be created: {error}", parent.display()))
         })?;
         write(&path, &file.text)?;
     }

@@ -18,9 +18,9 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     // Instruments are files or `period=SECONDS`; only files are inputs that must not be written over.
     let files = args.estimators.instruments.iter().map(PathBuf::from);
     let instruments: Vec<PathBuf> = files.filter(|file| file.exists()).collect();
-    let inputs = model.files().chain(
-        (args.data.iter().chain(&args.check).chain(&instruments)).map(AsRef::<Path>::as_ref),
-    );
+    let inputs = model
+        .files()
+        .chain((args.data.iter().chain(&args.check).chain(&instruments)).map(AsRef::<Path>::as_ref));
     let target = args
         .out
         .as_ref()
@@ -40,12 +40,7 @@ pub(crate) fn run(host: &Host, args: &IdentifyArgs) -> CommandOutcome {
     let recorded = match period {
         Some(_) => Vec::new(),
         None => {
-            let files: Vec<PathBuf> = args
-                .estimators
-                .instruments
-                .iter()
-                .map(PathBuf::from)
-                .collect();
+            let files: Vec<PathBuf> = args.estimators.instruments.iter().map(PathBuf::from).collect();
             commands::recordings(&model, &files, &reading)?
         }
     };

@@ -67,11 +67,7 @@ pub(crate) fn import_description(
     closures: Option<&Path>,
     options: Options<'_>,
 ) -> CommandOutcome<ImportedRobot> {
-    let text = read(
-        host,
-        file,
-        "a robot description (URDF, MJCF or SDF, all XML)",
-    )?;
+    let text = read(host, file, "a robot description (URDF, MJCF or SDF, all XML)")?;
     // The file of closures is read as text; the library parses it together with the URDF.
     let closures = closures
         .map(|path| read(host, path, "a file of closures (YAML)"))
@@ -85,13 +81,11 @@ pub(crate) fn import_description(
 
 /// The text of a file; `expected` states in the error which kind of file is needed.
 fn read(host: &Host, path: &Path, expected: &str) -> Result<String, CommandFailure> {
-    host.files()
-        .read_text(path, LARGEST_DESCRIPTION)
-        .map_err(|error| {
-            CommandFailure::Input(format!(
-                "{} cannot be read: {}; {expected} is expected",
-                path.display(),
-                error.fault
-            ))
-        })
+    host.files().read_text(path, LARGEST_DESCRIPTION).map_err(|error| {
+        CommandFailure::Input(format!(
+            "{} cannot be read: {}; {expected} is expected",
+            path.display(),
+            error.fault
+        ))
+    })
 }

@@ -94,9 +94,7 @@ pub(crate) fn load_quietly(host: &Host, path: &Path) -> CommandOutcome<LoadedMod
 pub(crate) fn files_of(path: &Path) -> Vec<PathBuf> {
     match path.to_str() {
         // A file whose name contains a plus is one file.
-        Some(text) if text.contains('+') && !path.exists() => {
-            text.split('+').map(PathBuf::from).collect()
-        }
+        Some(text) if text.contains('+') && !path.exists() => text.split('+').map(PathBuf::from).collect(),
         _ => vec![path.to_owned()],
     }
 }
@@ -112,11 +110,7 @@ pub(crate) fn recordings(
 }
 
 /// Reads one run and prepares it: positions, rates, accelerations and forces.
-fn recording(
-    model: &Model,
-    path: &Path,
-    reading: &RecordingOptions,
-) -> CommandOutcome<PreparedRecording> {
+fn recording(model: &Model, path: &Path, reading: &RecordingOptions) -> CommandOutcome<PreparedRecording> {
     let files = files_of(path);
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
     Ok(model.recording_of(&files, reading)?)
@@ -128,9 +122,7 @@ pub(crate) fn diagnose(
     args: &DiagnosisArgs,
     question: DiagnosisOptions,
 ) -> CommandOutcome<DiagnosisFindings> {
-    let model = args
-        .parameters
-        .apply_to(host, self::model(host, &args.model)?)?;
+    let model = args.parameters.apply_to(host, self::model(host, &args.model)?)?;
     let reading = args.preparation.reading();
     // Reads recordings and prepares them for a diagnosis.
     let read = |paths: &[PathBuf]| -> CommandOutcome<Vec<PreparedRecording>> {
@@ -166,12 +158,7 @@ fn nearby_models_hint(path: &Path) -> String {
         path.parent().unwrap_or(Path::new(""))
     };
     // The folder of the path first, then the usual folders of a project, then the current one.
-    let folders = [
-        own,
-        Path::new("models"),
-        Path::new("model-spec/models"),
-        Path::new(""),
-    ];
+    let folders = [own, Path::new("models"), Path::new("model-spec/models"), Path::new("")];
     for folder in folders {
         let here = if folder.as_os_str().is_empty() {
             Path::new(".")

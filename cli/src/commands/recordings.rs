@@ -19,8 +19,6 @@ pub(crate) fn run(host: &Host, args: &RecordingsArgs) -> CommandOutcome {
         let found: Vec<Value> = found.iter().map(RecordingContents::json).collect();
         return terminal::print_json(&json!({ "recordings": found }));
     }
-    let texts = found
-        .iter()
-        .map(|contents| contents.text(terminal::style()));
+    let texts = found.iter().map(|contents| contents.text(terminal::style()));
     terminal::print(&texts.collect::<Vec<_>>().join("\n\n"))
 }

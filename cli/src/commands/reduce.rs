@@ -22,10 +22,6 @@ pub(crate) fn run(host: &Host, args: &ReduceArgs) -> CommandOutcome {
         return terminal::print_json(&reduced.json(&args.out.display().to_string()));
     }
     terminal::print(&reduced.text())?;
-    terminal::note(&format!(
-        "{}: a model of {}",
-        target.path().display(),
-        reduced.rig
-    ));
+    terminal::note(&format!("{}: a model of {}", target.path().display(), reduced.rig));
     Ok(())
 }

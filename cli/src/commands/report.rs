@@ -29,15 +29,8 @@ pub(crate) fn run(host: &Host, args: &ReportArgs) -> CommandOutcome {
         repeat_with_nominal: false,
     };
     let findings = commands::diagnose(host, &args.diagnosis, question)?;
-    target.write(&page(
-        &findings,
-        &CommandLineSpelling::from_args(&args.diagnosis),
-    )?)?;
-    let says = words::verdict(
-        &findings.diagnosis,
-        findings.channels(),
-        findings.validation,
-    );
+    target.write(&page(&findings, &CommandLineSpelling::from_args(&args.diagnosis))?)?;
+    let says = words::verdict(&findings.diagnosis, findings.channels(), findings.validation);
     terminal::print(&format!(
         "{}\n\nThe page is {}.",
         words::lines(&says, 100).join("\n"),

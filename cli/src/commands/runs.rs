@@ -30,19 +30,12 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let inputs = || [&args.model].into_iter().chain(&data).map(PathBuf::as_path);
     // The ending of --out decides between JSON and a page; the target is checked before the long computation.
     let written = match &args.out {
-        Some(out)
-            if out
-                .extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("json")) =>
-        {
+        Some(out) if out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")) => {
             Some((OutputFile::new(out, inputs())?, RunsFileFormat::Json))
         }
         Some(out) => {
             output::make_folder(out)?;
-            Some((
-                OutputFile::new(&out.join(PAGE), inputs())?,
-                RunsFileFormat::Page,
-            ))
+            Some((OutputFile::new(&out.join(PAGE), inputs())?, RunsFileFormat::Page))
         }
         None => None,
     };
@@ -52,12 +45,10 @@ pub(crate) fn run(host: &Host, args: &RunsArgs) -> CommandOutcome {
     let recordings = data.iter().map(|path| {
         let files = commands::files_of(path);
         let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-        model
-            .recording_of(&files, &reading)
-            .map_err(|error| UnreadRun {
-                file: path.display().to_string(),
-                error,
-            })
+        model.recording_of(&files, &reading).map_err(|error| UnreadRun {
+            file: path.display().to_string(),
+            error,
+        })
     });
     let found = model.runs(recordings, &args.runs_options())?;
     match &written {
@@ -85,16 +76,15 @@ fn expand_paths(paths: &[PathBuf]) -> CommandOutcome<Vec<PathBuf>> {
         let text = path.to_string_lossy();
         // A folder gives its files with the ending of a recording, a pattern gives all files that match.
         let mut found: Vec<PathBuf> = if path.is_dir() {
-            let entries = std::fs::read_dir(path).map_err(|error| {
-                CommandFailure::Input(format!("the folder {text} cannot be read: {error}"))
-            })?;
+            let entries = std::fs::read_dir(path)
+                .map_err(|error| CommandFailure::Input(format!("the folder {text} cannot be read: {error}")))?;
             let files = entries.flatten().map(|entry| entry.path());
             files
                 .filter(|file| file.is_file() && has_recording_extension(file))
                 .collect()
         } else if text.contains(['*', '?']) && !path.exists() {
-            let matching = glob::glob(&text)
-                .map_err(|error| CommandFailure::Input(format!("--data {text}: {}", error.msg)))?;
+            let matching =
+                glob::glob(&text).map_err(|error| CommandFailure::Input(format!("--data {text}: {}", error.msg)))?;
             matching.flatten().filter(|file| file.is_file()).collect()
         } else {
             all.push(path.clone());
@@ -118,13 +108,9 @@ fn natural_sort_key(name: &str) -> Vec<(String, u64)> {
     let mut rest = name;
     while !rest.is_empty() {
         // Each piece is a text without digits and the number after it.
-        let text = rest
-            .find(|c: char| c.is_ascii_digit())
-            .unwrap_or(rest.len());
+        let text = rest.find(|c: char| c.is_ascii_digit()).unwrap_or(rest.len());
         let (before, after) = rest.split_at(text);
-        let digits = after
-            .find(|c: char| !c.is_ascii_digit())
-            .unwrap_or(after.len());
+        let digits = after.find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len());
         let (number, left) = after.split_at(digits);
         // Digits that are too many for a number stay in the order of their text.
         let value = number.parse().unwrap_or(u64::MAX);
@@ -142,9 +128,6 @@ mod tests {
     fn numbers_in_names_count_as_numbers() {
         let mut names = ["run10.csv", "run9.csv", "run9a.csv", "a.csv", "run010.csv"];
         names.sort_by_cached_key(|name| natural_sort_key(name));
-        assert_eq!(
-            names,
-            ["a.csv", "run9.csv", "run9a.csv", "run10.csv", "run010.csv"]
-        );
+        assert_eq!(names, ["a.csv", "run9.csv", "run9a.csv", "run10.csv", "run010.csv"]);
     }
 }

@@ -59,9 +59,7 @@ pub(crate) fn run(host: &Host, args: &WorkArgs) -> CommandOutcome {
         let _ = if args.json {
             terminal::print_json(&json!({ "url": link }))
         } else {
-            terminal::print(&format!(
-                "The workbench is open:\n  {link}\nPress Ctrl+C to stop it."
-            ))
+            terminal::print(&format!("The workbench is open:\n  {link}\nPress Ctrl+C to stop it."))
         };
     })?;
     Ok(())
@@ -149,9 +147,7 @@ impl WorkbenchCommands for WorkbenchAdvice {
             ..
         } = self;
         let before = quoted_path(before);
-        Some(format!(
-            "modelmill diff {before} {model}{all}{reading}{libraries}"
-        ))
+        Some(format!("modelmill diff {before} {model}{all}{reading}{libraries}"))
     }
 
     /// `modelmill excite` with the settings of the page.
@@ -160,11 +156,7 @@ impl WorkbenchCommands for WorkbenchAdvice {
         let mut words = format!("modelmill excite {}", self.model);
         // Name, value, and default of each setting.
         let options = [
-            (
-                "harmonics",
-                asked.harmonics.to_string(),
-                usual.harmonics.to_string(),
-            ),
+            ("harmonics", asked.harmonics.to_string(), usual.harmonics.to_string()),
             ("period", asked.period.to_string(), usual.period.to_string()),
             ("random", asked.random.to_string(), usual.random.to_string()),
             ("starts", asked.starts.to_string(), usual.starts.to_string()),
@@ -258,12 +250,7 @@ mod tests {
         let ProgramCommand::Excite(excite) = &excite.command else {
             panic!("another command");
         };
-        let told = (
-            excite.harmonics,
-            excite.period,
-            excite.limits.len(),
-            excite.starts,
-        );
+        let told = (excite.harmonics, excite.period, excite.limits.len(), excite.starts);
         assert_eq!(told, (3, 2.5, 2, asked.starts), "{command}");
         for step in [
             WorkbenchStep::Picture,
@@ -279,16 +266,12 @@ mod tests {
             let (data, preparation) = match &cli.command {
                 ProgramCommand::Compare(other) => (&other.data, &other.preparation),
                 ProgramCommand::Identify(other) => (&other.data, &other.preparation),
-                ProgramCommand::Diagnose(other) => {
-                    (&other.diagnosis.data, &other.diagnosis.preparation)
-                }
+                ProgramCommand::Diagnose(other) => (&other.diagnosis.data, &other.diagnosis.preparation),
                 _ => continue,
             };
             assert_eq!((data, preparation), (&args.data, &args.preparation));
         }
-        let command = spelled
-            .variant_command(Path::new("before this.toml"))
-            .unwrap();
+        let command = spelled.variant_command(Path::new("before this.toml")).unwrap();
         let cli = CommandLine::try_parse_from(words(&command));
         let cli = cli.unwrap_or_else(|error| panic!("{command}: {error}"));
         let ProgramCommand::Diff(other) = &cli.command else {

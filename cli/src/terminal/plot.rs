@@ -44,10 +44,7 @@ impl TerminalCurve<'_> {
         for x in 0..dots_x {
             let (from, to) = (x * n / dots_x, (x + 1) * n / dots_x);
             // One more value on the left connects a steep curve to the column before.
-            let Some(span) = self
-                .values
-                .get(from.saturating_sub(1)..to.max(from + 1).min(n))
-            else {
+            let Some(span) = self.values.get(from.saturating_sub(1)..to.max(from + 1).min(n)) else {
                 continue;
             };
             let low = span.iter().copied().fold(f64::INFINITY, f64::min);
@@ -132,10 +129,7 @@ mod tests {
         assert_eq!(lines.len(), 4);
         let dots = |line: &str| line.split_once('|').unwrap().1.chars().collect::<Vec<_>>();
         let first_dot = |line: &str| dots(line).iter().position(|c| *c != '\u{2800}').unwrap();
-        assert!(
-            first_dot(&lines[0]) > 40 && first_dot(&lines[3]) == 0,
-            "{lines:?}"
-        );
+        assert!(first_dot(&lines[0]) > 40 && first_dot(&lines[3]) == 0, "{lines:?}");
         assert_eq!(dots(&lines[0]).len(), WIDTH);
     }
 

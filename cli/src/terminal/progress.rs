@@ -58,9 +58,7 @@ impl ProgressListener for TerminalProgress {
             return;
         }
         // The first job waits for the rest of the program's patience, later ones only for the short one.
-        let first_look = PATIENCE
-            .saturating_sub(self.start.elapsed())
-            .max(SHORT_PATIENCE);
+        let first_look = PATIENCE.saturating_sub(self.start.elapsed()).max(SHORT_PATIENCE);
         let (going_on, waiting) = channel::<()>();
         let (what, job) = (what.to_owned(), Arc::clone(job));
         // The thread polls the job; the end of the channel is the end of the job.
@@ -135,8 +133,6 @@ fn new_bar(message: &str, total: usize) -> ProgressBar {
         let bar = ProgressBar::with_draw_target(None, target);
         (bar, "{spinner} {msg}, {elapsed}")
     };
-    let style =
-        ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
-    bar.with_style(style)
-        .with_message(text::plain(message).into_owned())
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_spinner());
+    bar.with_style(style).with_message(text::plain(message).into_owned())
 }

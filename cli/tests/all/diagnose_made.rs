@@ -48,15 +48,13 @@ fn recorded(name: &str, truth: &str, motion: &str, seed: u64) -> String {
         let fields: Vec<String> = header
             .iter()
             .zip(state)
-            .map(
-                |(name, field)| match DRIVES.iter().position(|d| d == name) {
-                    Some(drive) => {
-                        let force: f64 = force[at[drive]].parse().expect("a number");
-                        (force + NOISE * noise.next()).to_string()
-                    }
-                    None => (*field).to_owned(),
-                },
-            )
+            .map(|(name, field)| match DRIVES.iter().position(|d| d == name) {
+                Some(drive) => {
+                    let force: f64 = force[at[drive]].parse().expect("a number");
+                    (force + NOISE * noise.next()).to_string()
+                }
+                None => (*field).to_owned(),
+            })
             .collect();
         writeln!(text, "{}", fields.join(",")).expect("a string takes it");
     }
@@ -73,9 +71,7 @@ fn diagnosed(name: &str, more: &str, args: &[&str]) -> Value {
     std::fs::write(&truth, text).expect("a variant");
     let fit = recorded(name, &truth, &run("plain-fit.csv"), 1);
     let check = recorded(name, &truth, &run("plain-check.csv"), 2);
-    let mut all = vec![
-        "diagnose", &bare, "--data", &fit, "--check", &check, "--json",
-    ];
+    let mut all = vec!["diagnose", &bare, "--data", &fit, "--check", &check, "--json"];
     all.extend(args);
     json(&all)
 }
@@ -105,27 +101,19 @@ fn value(effect: &Value, name: &str) -> f64 {
 
 #[track_caller]
 fn near(found: f64, truth: f64, share: f64) {
-    assert!(
-        (found - truth).abs() <= share * truth.abs(),
-        "{found}, not {truth}"
-    );
+    assert!((found - truth).abs() <= share * truth.abs(), "{found}, not {truth}");
 }
 
 #[test]
 fn a_tilt_is_found_while_parameters_are_held() {
     let tilt = "[[effect]]\nkind = \"gravity_tilt\"\nat = [\"base\"]\nconstants = { tz = 0.05 }\n";
     let answer = diagnosed("tilt", tilt, &["--held"]);
-    near(
-        value(only(&answer, "gravity_tilt", &["base"]), "tz"),
-        0.05,
-        0.01,
-    );
+    near(value(only(&answer, "gravity_tilt", &["base"]), "tz"), 0.05, 0.01);
 }
 
 #[test]
 fn a_constant_that_places_share_is_found() {
-    let friction =
-        "[[effect]]\nkind = \"stribeck_friction\"\nat = [\"spindle_left\", \"spindle_right\"]
+    let friction = "[[effect]]\nkind = \"stribeck_friction\"\nat = [\"spindle_left\", \"spindle_right\"]
 parameters = { Fs = { nominal = 20.0 } }\nconstants = { vs = 0.01 }\n";
     let answer = diagnosed("shared", friction, &[]);
     let effect = only(&answer, "stribeck_friction", &DRIVES);

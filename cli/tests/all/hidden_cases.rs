@@ -33,19 +33,10 @@ fn hidden_effects_are_found() {
             left.unwrap_or(f64::INFINITY)
         };
         let mark = judge(case.class, &case.placed(), None, &answer, &mut excess);
-        assert!(
-            mark.is_right(),
-            "{}: {}; {answer:?}",
-            case.truth(),
-            mark.in_words()
-        );
+        assert!(mark.is_right(), "{}: {}; {answer:?}", case.truth(), mark.in_words());
         if !case.hidden.is_empty() {
             let last = answer.steps.last().expect("a ladder").check;
-            assert!(
-                last <= FALL * floor,
-                "{}: {last} over {floor}",
-                case.truth()
-            );
+            assert!(last <= FALL * floor, "{}: {last} over {floor}", case.truth());
         }
     }
 }

@@ -3,10 +3,7 @@
 use crate::common::{json, model, number, printed, refused, scratch, workspace};
 
 fn rigs(name: &str) -> String {
-    workspace("model-spec/rigs")
-        .join(name)
-        .display()
-        .to_string()
+    workspace("model-spec/rigs").join(name).display().to_string()
 }
 
 #[test]
@@ -51,15 +48,10 @@ fn what_a_plan_leaves_out_has_its_price() {
     let rig = rigs("spidermill-with-rods.toml");
     let says = refused(1, &["reduce", &rig, "--plan", &plan, "--out", &out]);
     assert!(
-        says.contains("the plan does not mention rod_left, rod_right")
-            && says.contains("rods.toml:"),
+        says.contains("the plan does not mention rod_left, rod_right") && says.contains("rods.toml:"),
         "{says}"
     );
-    let left = text.replacen(
-        "schema = 1",
-        "schema = 1\nleave_out = [\"rod_left\", \"rod_right\"]",
-        1,
-    );
+    let left = text.replacen("schema = 1", "schema = 1\nleave_out = [\"rod_left\", \"rod_right\"]", 1);
     std::fs::write(&plan, left).expect("written");
     let told = json(&["reduce", &rig, "--plan", &plan, "--out", &out, "--json"]);
     let price = number(&told, "/forces/0/nrms");
@@ -88,14 +80,7 @@ fn faults_of_a_reduction_are_said() {
     let plan = rigs("spidermill-plan.toml");
     let says = refused(
         2,
-        &[
-            "reduce",
-            &rigs("spidermill-full.toml"),
-            "--plan",
-            &plan,
-            "--out",
-            &plan,
-        ],
+        &["reduce", &rigs("spidermill-full.toml"), "--plan", &plan, "--out", &plan],
     );
     assert!(says.contains("overwrite"), "{says}");
     assert!(!std::path::Path::new(&out).exists());
@@ -112,11 +97,7 @@ fn a_urdf_becomes_a_model() {
     let out = scratch("arm-model.toml");
     let ran = crate::common::ran(&["import", &urdf, "--out", &out]);
     assert_eq!(ran.status, 0, "{}", ran.err);
-    assert!(
-        ran.err.contains("1.5708 rad, is not rounded to pi/2"),
-        "{}",
-        ran.err
-    );
+    assert!(ran.err.contains("1.5708 rad, is not rounded to pi/2"), "{}", ran.err);
     let ran = crate::common::ran(&["import", &urdf, "--round-angles", "--out", &out]);
     assert_eq!(ran.status, 0, "{}", ran.err);
     assert!(ran.err.contains("is rounded to pi/2"), "{}", ran.err);

@@ -57,12 +57,7 @@ impl Derivation {
 
     /// Eq. (6), one line per dependent product: `h[m2] = d1*h[m1*dc1] + ...`.
     pub fn dependency_texts(&self) -> Vec<String> {
-        let column = |product: usize| {
-            format!(
-                "h[{}]",
-                self.reduction.products[product].text(&self.mechanism)
-            )
-        };
+        let column = |product: usize| format!("h[{}]", self.reduction.products[product].text(&self.mechanism));
         let lines = self.reduction.dependencies.iter().map(|line| {
             // Retained products first, then dependent ones.
             let retained = line.equals.iter();
@@ -72,11 +67,7 @@ impl Derivation {
                 let column = PrintedFormula::name(column(product));
                 PrintedFormula::product(Rational::ONE, [factor.formula(&self.mechanism), column])
             });
-            format!(
-                "{} = {}",
-                column(line.product),
-                PrintedFormula::sum(terms).text()
-            )
+            format!("{} = {}", column(line.product), PrintedFormula::sum(terms).text())
         });
         lines.collect()
     }
@@ -88,11 +79,7 @@ impl Derivation {
         let value = |product: usize| reduction.products[product].value(parameters);
         // The retained product itself, then the dependent ones with their factors.
         let mut base: Vec<f64> = reduction.retained.iter().map(|k| value(*k)).collect();
-        for (line, factors) in reduction
-            .dependencies
-            .iter()
-            .zip(reduction.factors(constants))
-        {
+        for (line, factors) in reduction.dependencies.iter().zip(reduction.factors(constants)) {
             for (k, factor) in factors {
                 base[k] += factor * value(line.product);
             }
@@ -103,16 +90,12 @@ impl Derivation {
     /// Eq. (7) for given values of the constants, in the order of the model file: each base parameter as a sum of
     /// products of dynamic parameters with exact factors. Sines, cosines and roots of constants are those of floating
     /// point.
-    pub fn base_polynomials(
-        &self,
-        constants: &[BigRational],
-    ) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
+    pub fn base_polynomials(&self, constants: &[BigRational]) -> Vec<Vec<(ParameterMonomial, BigRational)>> {
         let reduction = &self.reduction;
         let product = |k: usize| reduction.products[k].clone();
         let retained = reduction.retained.iter();
-        let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> = retained
-            .map(|k| vec![(product(*k), BigRational::one())])
-            .collect();
+        let mut polynomials: Vec<Vec<(ParameterMonomial, BigRational)>> =
+            retained.map(|k| vec![(product(*k), BigRational::one())]).collect();
         // Factors by exact values of the constants.
         let factors = reduction.factors_by(&|factor| Some(factor.value_exact(constants)));
         let factors = factors.expect("numbers have a value for everything");
@@ -127,12 +110,7 @@ impl Derivation {
     /// Values of the base parameters for the model file's values. Identified values are used where the file has them,
     /// matched by expression; all others follow from the nominal parameters.
     pub fn nominal_base_values(&self) -> Vec<f64> {
-        let parameters: Vec<f64> = self
-            .mechanism
-            .parameters
-            .iter()
-            .map(|p| p.nominal)
-            .collect();
+        let parameters: Vec<f64> = self.mechanism.parameters.iter().map(|p| p.nominal).collect();
         let constants: Vec<f64> = self.mechanism.constants.iter().map(|c| c.value).collect();
         let mut values = self.base_values(&parameters, &constants);
         for (k, value) in self.identified_base() {

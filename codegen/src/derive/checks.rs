@@ -44,9 +44,7 @@ pub(crate) fn check_results(derivation: &Derivation) -> Result<(), DeriveError> 
 /// A number of a program that is infinite in floating point, as text.
 fn oversized_number(program: &StraightLineProgram) -> Option<String> {
     program.ops.iter().find_map(|op| match op {
-        ProgramOp::Number(number) if !number.to_f64().is_finite() => {
-            Some(number.to_big().to_string())
-        }
+        ProgramOp::Number(number) if !number.to_f64().is_finite() => Some(number.to_big().to_string()),
         _ => None,
     })
 }

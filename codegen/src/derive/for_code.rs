@@ -44,10 +44,7 @@ impl Derivation {
 
     /// How many gaps close the loops, couplings aside: eqs. (L1) to (Ln) of the page.
     pub fn loop_gap_count(&self) -> usize {
-        self.equations
-            .projection
-            .loops
-            .n_gap_equations(&self.mechanism)
+        self.equations.projection.loops.n_gap_equations(&self.mechanism)
     }
 
     /// How many determinants of the loops are divided by; their equations follow those of the gaps.

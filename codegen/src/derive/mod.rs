@@ -37,9 +37,7 @@ pub fn derive_columns(
     wanted: &dyn Fn(&ParameterMonomial) -> bool,
 ) -> Result<Derivation, DeriveError> {
     // Columns are evaluated once along each recording, which takes less time than a search for cheaper forms.
-    derive_with(mechanism, 0, |_, equations| {
-        Ok(without_reduction(equations, wanted))
-    })
+    derive_with(mechanism, 0, |_, equations| Ok(without_reduction(equations, wanted)))
 }
 
 /// The stages in their order. `reduce` goes from p_g to p_min, and `passes` is the number of passes that search for
@@ -55,9 +53,7 @@ fn derive_with(
     let equations = unreduced_equations(&mut graph, mechanism)?;
     let reduction = reduce(&mut graph, &equations)?;
     let closing = PassiveClosure::new(&mut graph, mechanism, &equations)?;
-    let programs = programs(
-        &mut graph, mechanism, &equations, &reduction, &closing, passes,
-    )?;
+    let programs = programs(&mut graph, mechanism, &equations, &reduction, &closing, passes)?;
     Ok(Derivation {
         mechanism: mechanism.clone(),
         graph,

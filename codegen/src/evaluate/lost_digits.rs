@@ -35,9 +35,7 @@ const NEARLY_LARGEST: f64 = 1e-3;
 pub(crate) fn check_lost_digits(derivation: &Derivation) -> Result<(), DeriveError> {
     match largest_digit_loss(derivation)? {
         // NaN means that all digits are lost.
-        Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => {
-            Err(lost_digits_error(derivation, &lost))
-        }
+        Some(lost) if lost.error.is_nan() || lost.error > MOST_LOST => Err(lost_digits_error(derivation, &lost)),
         _ => Ok(()),
     }
 }
@@ -89,10 +87,7 @@ fn largest_digit_loss(derivation: &Derivation) -> Result<Option<DigitLoss>, Deri
 fn with_all_parameters(mechanism: &Mechanism) -> Mechanism {
     let mut all = mechanism.clone();
     for parameter in all.parameters.iter_mut().filter(|p| p.nominal == 0.0) {
-        let alike = mechanism
-            .parameters
-            .iter()
-            .filter(|p| p.unit == parameter.unit);
+        let alike = mechanism.parameters.iter().filter(|p| p.unit == parameter.unit);
         let largest = alike.map(|p| p.nominal.abs()).fold(0.0, f64::max);
         parameter.nominal = if largest > 0.0 { largest } else { 1.0 };
     }
@@ -145,10 +140,7 @@ impl ForceSamples {
                 n_infinite += 1;
                 continue;
             }
-            rows.extend(
-                h.row_iter()
-                    .flat_map(|row| row.iter().copied().collect::<Vec<_>>()),
-            );
+            rows.extend(h.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>()));
             for (all, found) in forces.iter_mut().zip(found) {
                 for (all, found) in all.iter_mut().zip(found) {
                     all.extend(found);
@@ -184,9 +176,7 @@ impl ForceSamples {
             // The force from p_g, as a sum of terms.
             let row = self.full.row(state * n_drives + drive);
             let terms = row.iter().zip(values).map(|(h, p)| h * p);
-            let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| {
-                (sum + term, size + term.abs())
-            });
+            let (sum, sizes) = terms.fold((0.0, 0.0), |(sum, size), term| (sum + term, size + term.abs()));
             size += sizes * sizes;
             for (error, forces) in errors.iter_mut().zip(&self.forces) {
                 *error += (forces[drive][state] - sum).powi(2);
@@ -218,9 +208,7 @@ impl NearbyState {
     /// Draws a state; lengths scale with their nominal value.
     fn random_near_nominal(mechanism: &Mechanism, reach: f64, stream: &mut RandomStream) -> Self {
         // Passive coordinates follow from the loops.
-        let active: Vec<_> = (mechanism.coordinates.iter())
-            .filter(|c| !c.passive)
-            .collect();
+        let active: Vec<_> = (mechanism.coordinates.iter()).filter(|c| !c.passive).collect();
         let q = active.iter().map(|c| {
             let one = if c.motion.is_angle() || c.nominal == 0.0 {
                 1.0
@@ -230,8 +218,7 @@ impl NearbyState {
             c.nominal + reach * one * uniform_symmetric(stream)
         });
         let q = q.collect();
-        let mut moving =
-            |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
+        let mut moving = |n: usize, most: f64| (0..n).map(|_| most * uniform_symmetric(stream)).collect();
         Self {
             q,
             qd: moving(active.len(), 2.0),
@@ -268,27 +255,15 @@ fn lost_digits_error(derivation: &Derivation, found: &DigitLoss) -> DeriveError 
                 let retained = reduction.retained[*k];
                 let term = factor * found.values[line.product] * norm(retained);
                 // NaN counts as infinite.
-                (
-                    retained,
-                    if term.is_nan() {
-                        f64::INFINITY
-                    } else {
-                        term.abs()
-                    },
-                )
+                (retained, if term.is_nan() { f64::INFINITY } else { term.abs() })
             });
             (line.product, terms.collect())
         })
         .collect();
     // Lines with the largest terms, and the retained products in them.
     let largest = |terms: &[(usize, f64)]| terms.iter().map(|t| t.1).fold(0.0, f64::max);
-    let all = lines
-        .iter()
-        .map(|(_, terms)| largest(terms))
-        .fold(0.0, f64::max);
-    let worst = lines
-        .iter()
-        .filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
+    let all = lines.iter().map(|(_, terms)| largest(terms)).fold(0.0, f64::max);
+    let worst = lines.iter().filter(|(_, terms)| largest(terms) >= NEARLY_LARGEST * all);
     // Names for the message.
     let dependent: Vec<String> = worst.clone().map(|(product, _)| name(*product)).collect();
     let mut retained: Vec<usize> = worst
@@ -317,17 +292,13 @@ mod tests {
         let folder = env!("CARGO_MANIFEST_DIR");
         let path = format!("{folder}/../model-spec/models/{name}.toml");
         let loaded = modelmill_spec::load_file(path.as_ref());
-        loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+        loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism
     }
 
     fn read(text: &str) -> Mechanism {
         let files = modelmill_boundary::files::MemoryFiles::default();
         let loaded = modelmill_spec::load("made.toml", text, &files);
-        loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism
+        loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism
     }
 
     /// A line of the model file that retains the masses instead of the body's own products.
@@ -381,11 +352,7 @@ mod tests {
     fn errors_by_hand(derivation: &Derivation) -> [f64; 2] {
         let [a, b] = [0, 1].map(|k| derivation.mechanism.constants[k].value);
         let evaluator = ModelEvaluator::new(derivation);
-        [
-            derivation.nominal_base_values(),
-            evaluator.base_parameters(),
-        ]
-        .map(|base| {
+        [derivation.nominal_base_values(), evaluator.base_parameters()].map(|base| {
             let (mut error, mut size) = (0.0_f64, 0.0_f64);
             for k in 0..40 {
                 let (q, qdd) = (0.13 * f64::from(k), 3.0 - 0.4 * f64::from(k % 17));
@@ -395,9 +362,7 @@ mod tests {
                     qdd: vec![qdd],
                     load: vec![0.0],
                 };
-                let found = evaluator
-                    .inverse_dynamics(&state.as_motion_states(), &base)
-                    .unwrap()[0][0];
+                let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
                 let inertia = a * a + 2.0 * b * b + 0.35;
                 let moment = a + 2.0 * b + 1.05;
                 let expected = inertia * qdd + 9.81 * (moment * q.cos() - 0.2 * q.sin());
@@ -440,13 +405,9 @@ mod tests {
     #[test]
     fn differences_in_denominators_are_exact() {
         for exponent in [4, 6, 8] {
-            let derivation =
-                crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
+            let derivation = crate::derive::derive(&pendulum(10_f64.powi(-exponent), MASSES)).unwrap();
             let [error, _] = errors_by_hand(&derivation);
-            assert!(
-                error < 10_f64.powi(exponent - 15),
-                "1e-{exponent}: {error:e}"
-            );
+            assert!(error < 10_f64.powi(exponent - 15), "1e-{exponent}: {error:e}");
         }
     }
 
@@ -454,9 +415,7 @@ mod tests {
     fn the_refusal_names_the_products_that_should_not_be_retained() {
         let mechanism = pendulum(1e-14, MASSES);
         let Err(DeriveError::DigitsLost {
-            retained,
-            dependent,
-            ..
+            retained, dependent, ..
         }) = derive(&mechanism)
         else {
             panic!("refused");
@@ -478,15 +437,10 @@ mod tests {
 
     /// Masses at `places` along a pendulum, and nothing else.
     fn masses(places: &[f64]) -> Mechanism {
-        let (mut constants, mut parameters, mut lumps) =
-            (String::new(), String::new(), String::new());
+        let (mut constants, mut parameters, mut lumps) = (String::new(), String::new(), String::new());
         for (i, x) in places.iter().enumerate() {
             let _ = writeln!(constants, "a{i} = {{ value = {x:?}, unit = \"m\" }}");
-            let _ = writeln!(
-                parameters,
-                "m{i} = {{ nominal = {}.0, unit = \"kg\" }}",
-                i + 1
-            );
+            let _ = writeln!(parameters, "m{i} = {{ nominal = {}.0, unit = \"kg\" }}", i + 1);
             let _ = writeln!(
                 lumps,
                 "[[lumped_mass]]\nmass = \"m{i}\"\non = \"arm\"\nat = [\"a{i}\", 0, 0]"
@@ -514,13 +468,9 @@ mod tests {
                 load: vec![0.0],
             };
             let evaluator = ModelEvaluator::new(&derivation);
-            let found = evaluator
-                .inverse_dynamics(&state.as_motion_states(), &base)
-                .unwrap()[0][0];
+            let found = evaluator.inverse_dynamics(&state.as_motion_states(), &base).unwrap()[0][0];
             let terms = places.iter().zip([1.0, 2.0, 3.0, 4.0]);
-            let expected: f64 = terms
-                .map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos()))
-                .sum();
+            let expected: f64 = terms.map(|(x, m)| m * x * (2.0 * x + 9.81 * 0.5_f64.cos())).sum();
             let error = (found - expected).abs() / expected;
             assert!(error < 1e-12, "{gap:e}: {error:e}");
         }
@@ -580,9 +530,9 @@ mod tests {
             let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-13, "{z:?}: {lost:e}");
             let lines = derivation.reduction.dependencies.iter();
-            let has_quotients = lines.flat_map(|line| &line.equals).any(|(_, factor)| {
-                factor.denominator != RationalFunction::constant(Rational::ONE).denominator
-            });
+            let has_quotients = lines
+                .flat_map(|line| &line.equals)
+                .any(|(_, factor)| factor.denominator != RationalFunction::constant(Rational::ONE).denominator);
             assert!(!has_quotients);
         }
     }
@@ -595,22 +545,13 @@ mod tests {
             parameter.nominal = 0.0;
         }
         let found = derive(&mechanism).map(|_| ());
-        assert!(
-            matches!(found, Err(DeriveError::DigitsLost { .. })),
-            "{found:?}"
-        );
+        assert!(matches!(found, Err(DeriveError::DigitsLost { .. })), "{found:?}");
     }
 
     /// Consistent models lose almost no digits.
     #[test]
     fn sound_models_are_far_from_the_threshold() {
-        for name in [
-            "two_link",
-            "spidermill-paper",
-            "four_bar",
-            "stanford",
-            "tx40",
-        ] {
+        for name in ["two_link", "spidermill-paper", "four_bar", "stanford", "tx40"] {
             let derivation = derive(&model(name)).unwrap();
             let lost = largest_digit_loss(&derivation).unwrap().unwrap().error;
             assert!(lost < 1e-11, "{name}: {lost:e}");

@@ -32,11 +32,7 @@ impl<'a> SingleStateProgram<'a> {
     }
 
     /// Runs the program at one state; `read` gets a function that returns output k.
-    pub(super) fn run<R>(
-        &self,
-        input: impl Fn(Atom) -> f64,
-        read: impl FnOnce(&dyn Fn(usize) -> f64) -> R,
-    ) -> R {
+    pub(super) fn run<R>(&self, input: impl Fn(Atom) -> f64, read: impl FnOnce(&dyn Fn(usize) -> f64) -> R) -> R {
         let mut values = self.values.borrow_mut();
         // Only operations of the state are computed.
         let ops = self.program.ops.iter().zip(&self.program.stages);
@@ -171,13 +167,7 @@ impl<'a> RegisterMachine<'a> {
         let (spare, zero) = (n_slots, n_slots + 1);
         let steps = slot_instructions(program, &computed, &slots, spare);
         let outputs = program.outputs.iter().enumerate();
-        let outputs = outputs.map(|(k, value)| {
-            if wanted(k) {
-                slots[value.index()]
-            } else {
-                zero
-            }
-        });
+        let outputs = outputs.map(|(k, value)| if wanted(k) { slots[value.index()] } else { zero });
         Self {
             program,
             fixed,
@@ -253,9 +243,7 @@ impl<'a> RegisterMachine<'a> {
             let size = guard
                 .reference_size()
                 .map_or(1.0, |size| self.block_values(size, memory)[0]);
-            let k = values[..len]
-                .iter()
-                .position(|v| !guard.is_satisfied(*v, size))?;
+            let k = values[..len].iter().position(|v| !guard.is_satisfied(*v, size))?;
             Some((k, *guard))
         });
         // Emitted code checks fixed values before those of a state.
@@ -291,25 +279,15 @@ fn slot_instructions(
             ProgramOp::Div(a, b) => SlotInstruction::Div(to, slot(a), slot(b)),
             ProgramOp::Atan2(a, b) => SlotInstruction::Atan2(to, slot(a), slot(b)),
             ProgramOp::Neg(a) => SlotInstruction::Neg(to, slot(a)),
-            ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => {
-                SlotInstruction::SinCos(spare, to, slot(a))
-            }
+            ProgramOp::Cos(a) | ProgramOp::Unary(Unary::Cos, a) => SlotInstruction::SinCos(spare, to, slot(a)),
             // If both are needed, the cosine of the same angle is the operation before the sine, and the slot of the
             // angle is not reused yet.
-            ProgramOp::Sin(a)
-                if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) =>
-            {
+            ProgramOp::Sin(a) if i > 0 && computed[i - 1] && program.ops[i - 1] == ProgramOp::Cos(*a) => {
                 steps.pop();
-                let cos = if slots[i - 1] == to {
-                    spare
-                } else {
-                    slots[i - 1]
-                };
+                let cos = if slots[i - 1] == to { spare } else { slots[i - 1] };
                 SlotInstruction::SinCos(to, cos, slot(a))
             }
-            ProgramOp::Sin(a) | ProgramOp::Unary(Unary::Sin, a) => {
-                SlotInstruction::SinCos(to, spare, slot(a))
-            }
+            ProgramOp::Sin(a) | ProgramOp::Unary(Unary::Sin, a) => SlotInstruction::SinCos(to, spare, slot(a)),
             ProgramOp::Unary(function, a) => SlotInstruction::Unary(to, *function, slot(a)),
             ProgramOp::Number(_) => unreachable!("numbers are fixed"),
         };
@@ -365,10 +343,7 @@ impl WithSimd for BlockExecution<'_, '_> {
 }
 
 /// The slots as distinct arrays. A target is never an operand, so this cannot fail.
-fn distinct_slots<const N: usize>(
-    memory: &mut [[f64; BLOCK]],
-    slots: [usize; N],
-) -> [&mut [f64; BLOCK]; N] {
+fn distinct_slots<const N: usize>(memory: &mut [[f64; BLOCK]], slots: [usize; N]) -> [&mut [f64; BLOCK]; N] {
     memory
         .get_disjoint_mut(slots)
         .expect("a step's target is none of its operands")
@@ -391,13 +366,7 @@ fn apply_unary(memory: &mut [[f64; BLOCK]], to: usize, a: usize, operation: impl
 /// can vectorise.
 #[allow(clippy::inline_always, reason = "as above")]
 #[inline(always)]
-fn apply_binary(
-    memory: &mut [[f64; BLOCK]],
-    to: usize,
-    a: usize,
-    b: usize,
-    operation: impl Fn(f64, f64) -> f64,
-) {
+fn apply_binary(memory: &mut [[f64; BLOCK]], to: usize, a: usize, b: usize, operation: impl Fn(f64, f64) -> f64) {
     if a == b {
         return apply_unary(memory, to, a, |x| operation(x, x));
     }

@@ -97,11 +97,7 @@ impl fmt::Display for PoseFault {
             PoseReason::Singular => {
                 write!(f, "at sample {} the mechanism is singular", self.sample)
             }
-            PoseReason::Undefined => write!(
-                f,
-                "at sample {} a term of the model has no finite value",
-                self.sample
-            ),
+            PoseReason::Undefined => write!(f, "at sample {} a term of the model has no finite value", self.sample),
             PoseReason::NotFinite { input } => {
                 write!(f, "at sample {} `{input}` is no finite number", self.sample)
             }
@@ -129,12 +125,7 @@ pub struct ModelEvaluator<'a> {
 impl<'a> ModelEvaluator<'a> {
     /// An evaluator with the model file's values.
     pub fn new(derivation: &'a Derivation) -> Self {
-        let constants = derivation
-            .mechanism
-            .constants
-            .iter()
-            .map(|c| c.value)
-            .collect();
+        let constants = derivation.mechanism.constants.iter().map(|c| c.value).collect();
         Self::with_constants(derivation, constants)
     }
 
@@ -204,11 +195,7 @@ impl<'a> ModelEvaluator<'a> {
     }
 
     /// Forces of the drives for given base parameters: one vector per drive.
-    pub fn inverse_dynamics(
-        &self,
-        states: &MotionStates<'_>,
-        base: &[f64],
-    ) -> Result<Vec<Vec<f64>>, PoseFault> {
+    pub fn inverse_dynamics(&self, states: &MotionStates<'_>, base: &[f64]) -> Result<Vec<Vec<f64>>, PoseFault> {
         self.evaluate_program(&self.programs.inverse_dynamics, states, base)
     }
 
@@ -314,13 +301,11 @@ impl<'a> ModelEvaluator<'a> {
                 .collect();
             let mut solution: Vec<f64> = (0..n)
                 .map(|a| {
-                    let driven =
-                        (0..n_drives).map(|d| jacobian[d * n + a][sample] * forces[d][sample]);
+                    let driven = (0..n_drives).map(|d| jacobian[d * n + a][sample] * forces[d][sample]);
                     driven.sum::<f64>() - bias[a][sample]
                 })
                 .collect();
-            modelmill_runtime::solve(&mut matrix, &mut solution)
-                .map_err(|error| fault(error.into()))?;
+            modelmill_runtime::solve(&mut matrix, &mut solution).map_err(|error| fault(error.into()))?;
             for (column, value) in accelerations.iter_mut().zip(solution) {
                 column.push(value);
             }
@@ -377,10 +362,7 @@ impl<'a> ModelEvaluator<'a> {
         visit: impl FnMut(&OutputBlock<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         // Number of states before the first known fault, and this fault.
-        let (mut n, mut fault) = (
-            states.len(),
-            self.find_not_finite_input(program, states, base),
-        );
+        let (mut n, mut fault) = (states.len(), self.find_not_finite_input(program, states, base));
         if let Some(fault) = &fault {
             n = fault.sample;
         }
@@ -395,8 +377,7 @@ impl<'a> ModelEvaluator<'a> {
             }
         }
         // Fixed values of the program are computed here, outputs that are not wanted are skipped.
-        let machine =
-            RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
+        let machine = RegisterMachine::for_outputs(program, wanted, |atom| self.fixed_value(atom, base));
         let input = |atom| match atom {
             Atom::Coordinate(i) => match self.coordinate_source(i) {
                 CoordinateSource::Active(k) => states.q[k],
@@ -492,12 +473,7 @@ impl<'a> ModelEvaluator<'a> {
 
     /// Passive coordinates of the first `n` states by Newton's method. Each state starts from the one before, or from
     /// the nominal pose if that fails.
-    fn solve_passive(
-        &self,
-        programs: &LoopPrograms,
-        states: &MotionStates<'_>,
-        n: usize,
-    ) -> PassiveTrajectory {
+    fn solve_passive(&self, programs: &LoopPrograms, states: &MotionStates<'_>, n: usize) -> PassiveTrajectory {
         let machine = |program| RegisterMachine::new(program, |atom| self.fixed_value(atom, &[]));
         let loops = LoopEvaluator {
             evaluator: self,
@@ -523,14 +499,7 @@ impl<'a> ModelEvaluator<'a> {
             // From the state before, which is usually close.
             let near = last.and_then(|(at, passive)| follow(&loops, &at, &passive, &active).ok());
             let found = near.map_or_else(
-                || {
-                    follow(
-                        &loops,
-                        &first_active,
-                        first.as_ref().map_err(|e| *e)?,
-                        &active,
-                    )
-                },
+                || follow(&loops, &first_active, first.as_ref().map_err(|e| *e)?, &active),
                 Ok,
             );
             match found {

@@ -20,12 +20,7 @@ impl AtomAngleSum {
         for (atom, factor) in terms {
             *merged.entry(atom).or_insert(0) += factor;
         }
-        Self(
-            merged
-                .into_iter()
-                .filter(|(_, factor)| *factor != 0)
-                .collect(),
-        )
+        Self(merged.into_iter().filter(|(_, factor)| *factor != 0).collect())
     }
 
     /// The atoms with their factors.

@@ -127,10 +127,7 @@ impl Graph {
         let mut scale = Rational::ONE;
         let mut flat: Vec<(ExprId, i32)> = Vec::with_capacity(factors.len());
         // Adds an exponent to a factor that is in the list, or appends the factor.
-        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat
-            .iter_mut()
-            .find(|f| f.0 == base)
-        {
+        let push = |flat: &mut Vec<(ExprId, i32)>, base: ExprId, n: i32| match flat.iter_mut().find(|f| f.0 == base) {
             Some(found) => found.1 += n,
             None => flat.push((base, n)),
         };
@@ -207,8 +204,7 @@ impl Graph {
                     }
                 }
                 Unary::Sign => {
-                    let sign =
-                        i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
+                    let sign = i64::from(!value.is_zero()) * if value.is_negative() { -1 } else { 1 };
                     return self.integer(sign);
                 }
                 Unary::Abs => return self.rational(value.abs()),
@@ -327,16 +323,11 @@ impl Graph {
             // Whether a term of the inner sum is the negative of an outer term, or of a term inside another nested sum.
             let cancels = inner.iter().any(|(base, k)| {
                 let k = k * factor;
-                flat.iter()
-                    .enumerate()
-                    .filter(|(j, _)| *j != i)
-                    .any(|(_, (other, m))| {
-                        let opposite = |m: &Rational| (m + &k).is_zero();
-                        (other == base && opposite(m))
-                            || inner_terms(*other).is_some_and(|t| {
-                                t.iter().any(|(b, x)| b == base && opposite(&(x * m)))
-                            })
-                    })
+                flat.iter().enumerate().filter(|(j, _)| *j != i).any(|(_, (other, m))| {
+                    let opposite = |m: &Rational| (m + &k).is_zero();
+                    (other == base && opposite(m))
+                        || inner_terms(*other).is_some_and(|t| t.iter().any(|(b, x)| b == base && opposite(&(x * m))))
+                })
             });
             if cancels {
                 let mut opened: Vec<_> = flat

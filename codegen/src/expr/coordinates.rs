@@ -7,12 +7,6 @@ pub(crate) fn coordinates_of(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     let atoms = graph.atoms(roots);
     atoms
         .into_iter()
-        .filter_map(|atom| {
-            if let Atom::Coordinate(i) = atom {
-                Some(i)
-            } else {
-                None
-            }
-        })
+        .filter_map(|atom| if let Atom::Coordinate(i) = atom { Some(i) } else { None })
         .collect()
 }

@@ -7,10 +7,7 @@ use super::{Atom, ExprId, Graph, Node, Rational, Unary};
 impl Graph {
     /// Partial derivative of each root by `atom`. The sign function counts as constant.
     pub fn differentiate(&mut self, roots: &[ExprId], atom: Atom) -> Vec<ExprId> {
-        self.directional(
-            roots,
-            |_, a| if a == atom { Graph::ONE } else { Graph::ZERO },
-        )
+        self.directional(roots, |_, a| if a == atom { Graph::ONE } else { Graph::ZERO })
     }
 
     /// Time derivative of each root: coordinates become rates, rates become accelerations, and all other atoms are
@@ -24,11 +21,7 @@ impl Graph {
     }
 
     /// Derivative of each root along a direction: `speed` returns the derivative of every atom.
-    pub fn directional(
-        &mut self,
-        roots: &[ExprId],
-        mut speed: impl FnMut(&mut Graph, Atom) -> ExprId,
-    ) -> Vec<ExprId> {
+    pub fn directional(&mut self, roots: &[ExprId], mut speed: impl FnMut(&mut Graph, Atom) -> ExprId) -> Vec<ExprId> {
         // Forward differentiation: operands come before the nodes that use them.
         let needed = self.reachable(roots);
         // Derivative of every node so far.
@@ -56,10 +49,7 @@ impl Graph {
                 }
                 // A sum keeps its factors.
                 Node::Sum(terms) => {
-                    let terms: Vec<_> = terms
-                        .into_iter()
-                        .map(|(child, k)| (derivative[&child], k))
-                        .collect();
+                    let terms: Vec<_> = terms.into_iter().map(|(child, k)| (derivative[&child], k)).collect();
                     self.sum(&terms)
                 }
                 // Product rule; factors that are constant along the direction contribute nothing.

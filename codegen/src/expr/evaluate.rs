@@ -23,12 +23,7 @@ pub trait EvaluationDomain {
     fn power(&self, a: &Self::Value, n: i32) -> Option<Self::Value>;
     /// `a^n` for a negative `n`. `inverse` belongs to `a` and is empty at first: a domain in which division takes long
     /// keeps `1/a` there for further powers.
-    fn negative_power(
-        &self,
-        a: &Self::Value,
-        n: i32,
-        inverse: &mut Option<Self::Value>,
-    ) -> Option<Self::Value> {
+    fn negative_power(&self, a: &Self::Value, n: i32, inverse: &mut Option<Self::Value>) -> Option<Self::Value> {
         let _ = inverse;
         self.power(a, n)
     }
@@ -148,9 +143,7 @@ impl EvaluationTape {
                     }
                     TapeStep::Product(start..index(tape.operands.len()))
                 }
-                Node::Unary(function, child) => {
-                    TapeStep::Unary(*function, positions[child.index()])
-                }
+                Node::Unary(function, child) => TapeStep::Unary(*function, positions[child.index()]),
             };
             tape.steps.push(step);
         }
@@ -180,8 +173,7 @@ impl EvaluationTape {
         let rationals: Vec<D::Value> = rationals.collect::<Option<_>>()?;
         let mut inverses: Vec<Option<D::Value>> = vec![None; self.n_divisors];
         let mut values: Vec<D::Value> = Vec::with_capacity(self.steps.len());
-        let operands =
-            |range: &Range<u32>| &self.operands[range.start as usize..range.end as usize];
+        let operands = |range: &Range<u32>| &self.operands[range.start as usize..range.end as usize];
         for step in &self.steps {
             // Values of operands are known, since the tape has them before their nodes.
             let value = match step {
@@ -195,9 +187,7 @@ impl EvaluationTape {
                         // Products with 1 are skipped: they are the most frequent ones.
                         let value = &values[operand.step as usize];
                         let scaled = match operand.kind {
-                            OperandKind::Scaled(k) => {
-                                Some(domain.mul(&rationals[k as usize], value))
-                            }
+                            OperandKind::Scaled(k) => Some(domain.mul(&rationals[k as usize], value)),
                             _ => None,
                         };
                         let term = scaled.as_ref().unwrap_or(value);
@@ -228,9 +218,7 @@ impl EvaluationTape {
                     }
                     total?
                 }
-                TapeStep::Unary(function, argument) => {
-                    domain.unary(*function, &values[*argument as usize])?
-                }
+                TapeStep::Unary(function, argument) => domain.unary(*function, &values[*argument as usize])?,
             };
             values.push(value);
         }
@@ -473,10 +461,7 @@ impl EvaluationDomain for RationalPoint {
             let (c, s) = self.angles.get(atom)?;
             let s = if *n < 0 { -s } else { s.clone() };
             for _ in 0..n.unsigned_abs() {
-                total = (
-                    &(&total.0 * c) - &(&total.1 * &s),
-                    &(&total.0 * &s) + &(&total.1 * c),
-                );
+                total = (&(&total.0 * c) - &(&total.1 * &s), &(&total.0 * &s) + &(&total.1 * c));
             }
         }
         Some(total)

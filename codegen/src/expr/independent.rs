@@ -18,10 +18,7 @@ pub(crate) const IDLE: usize = 2;
 ///
 /// # Errors
 /// [`DeriveError::NoPointFound`] if the functions have no values at nearly all random points.
-pub(crate) fn independent_functions(
-    graph: &Graph,
-    roots: &[ExprId],
-) -> Result<Vec<usize>, DeriveError> {
+pub(crate) fn independent_functions(graph: &Graph, roots: &[ExprId]) -> Result<Vec<usize>, DeriveError> {
     if roots.is_empty() {
         return Ok(Vec::new());
     }

@@ -69,10 +69,7 @@ impl EvaluationDomain for BigFloatPoint {
             let (c, s) = self.circles.get(atom)?;
             let s = if *n < 0 { -s } else { s.clone() };
             for _ in 0..n.unsigned_abs() {
-                total = (
-                    &(&total.0 * c) - &(&total.1 * &s),
-                    &(&total.0 * &s) + &(&total.1 * c),
-                );
+                total = (&(&total.0 * c) - &(&total.1 * &s), &(&total.0 * &s) + &(&total.1 * c));
             }
         }
         Some(total)

@@ -68,10 +68,7 @@ pub enum Atom {
 impl Atom {
     /// Whether it is known once the geometry and the parameters are.
     pub(crate) fn is_fixed(self) -> bool {
-        matches!(
-            self,
-            Self::Pi | Self::Constant(_) | Self::Parameter(_) | Self::Base(_)
-        )
+        matches!(self, Self::Pi | Self::Constant(_) | Self::Parameter(_) | Self::Base(_))
     }
 }
 
@@ -180,12 +177,9 @@ impl Graph {
         // Parents have larger indices than their operands, so one backward pass reaches everything.
         for i in (0..self.nodes.len()).rev() {
             if seen[i] {
-                self.for_each_child(
-                    ExprId(u32::try_from(i).expect("graph below 4G nodes")),
-                    |child| {
-                        seen[child.index()] = true;
-                    },
-                );
+                self.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
+                    seen[child.index()] = true;
+                });
             }
         }
         seen
@@ -235,18 +229,10 @@ impl Graph {
             if needed {
                 // The same node with the new ids of its operands.
                 let node = match self.nodes[i].clone() {
-                    Node::Sum(terms) => Node::Sum(
-                        terms
-                            .into_iter()
-                            .map(|(c, k)| (new[c.index()], k))
-                            .collect(),
-                    ),
-                    Node::Product(factors) => Node::Product(
-                        factors
-                            .into_iter()
-                            .map(|(c, n)| (new[c.index()], n))
-                            .collect(),
-                    ),
+                    Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (new[c.index()], k)).collect()),
+                    Node::Product(factors) => {
+                        Node::Product(factors.into_iter().map(|(c, n)| (new[c.index()], n)).collect())
+                    }
                     Node::Unary(function, c) => Node::Unary(function, new[c.index()]),
                     leaf => leaf,
                 };

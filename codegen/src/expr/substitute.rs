@@ -9,11 +9,7 @@ impl Graph {
     /// again.
     ///
     /// Returns the new roots in the order of `roots`; nodes without a replacement below them stay the same nodes.
-    pub fn substitute(
-        &mut self,
-        roots: &[ExprId],
-        replacements: &BTreeMap<ExprId, ExprId>,
-    ) -> Vec<ExprId> {
+    pub fn substitute(&mut self, roots: &[ExprId], replacements: &BTreeMap<ExprId, ExprId>) -> Vec<ExprId> {
         if replacements.is_empty() {
             return roots.to_vec();
         }
@@ -30,19 +26,11 @@ impl Graph {
                 // Nodes are rebuilt only if an operand has changed.
                 match self.node(id) {
                     Node::Sum(terms) if terms.iter().any(|(c, _)| rewritten[c.index()] != *c) => {
-                        let terms: Vec<_> = terms
-                            .iter()
-                            .map(|(c, k)| (rewritten[c.index()], k.clone()))
-                            .collect();
+                        let terms: Vec<_> = terms.iter().map(|(c, k)| (rewritten[c.index()], k.clone())).collect();
                         self.sum(&terms)
                     }
-                    Node::Product(factors)
-                        if factors.iter().any(|(c, _)| rewritten[c.index()] != *c) =>
-                    {
-                        let factors: Vec<_> = factors
-                            .iter()
-                            .map(|(c, n)| (rewritten[c.index()], *n))
-                            .collect();
+                    Node::Product(factors) if factors.iter().any(|(c, _)| rewritten[c.index()] != *c) => {
+                        let factors: Vec<_> = factors.iter().map(|(c, n)| (rewritten[c.index()], *n)).collect();
                         self.product(&factors)
                     }
                     Node::Unary(function, child) if rewritten[child.index()] != *child => {

@@ -5,8 +5,8 @@ use modelmill_algebra::field::{FieldElement, MODULUS};
 use proptest::prelude::*;
 
 use super::{
-    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph,
-    Rational, RationalPoint, Unary,
+    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Rational,
+    RationalPoint, Unary,
 };
 
 /// A random expression as a program for the constructors: each step uses values made before.
@@ -30,11 +30,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![
         (-5i64..6, 1i64..4).prop_map(|(n, d)| Step::Number(n, d)),
         (0..3usize).prop_map(Step::Atom),
-        (
-            prop::collection::vec((0..2usize, -2i32..3), 1..3),
-            any::<bool>()
-        )
-            .prop_map(|(a, s)| Step::Angle(a, s)),
+        (prop::collection::vec((0..2usize, -2i32..3), 1..3), any::<bool>()).prop_map(|(a, s)| Step::Angle(a, s)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Add(a, b)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Sub(a, b)),
         (i.clone(), i.clone()).prop_map(|(a, b)| Step::Mul(a, b)),
@@ -51,9 +47,7 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 fn point(seed: [i64; 3], tangents: [i64; 2]) -> RationalPoint {
     let mut point = RationalPoint::default();
     for (i, value) in seed.into_iter().enumerate() {
-        point
-            .values
-            .insert(Atom::Parameter(i), Rational::new(value, 7));
+        point.values.insert(Atom::Parameter(i), Rational::new(value, 7));
     }
     for (i, t) in tangents.into_iter().enumerate() {
         let t = Rational::new(t, 5);
@@ -121,23 +115,14 @@ fn build(graph: &mut Graph, steps: &[Step], point: &RationalPoint) -> (Vec<ExprI
                 (graph.unary(Unary::Sign, a), Rational::integer(sign))
             }
             Step::SumOf(terms) => {
-                let terms: Vec<_> = terms
-                    .iter()
-                    .map(|(i, k)| (get(*i), Rational::integer(*k)))
-                    .collect();
-                let value = terms
-                    .iter()
-                    .fold(Rational::ZERO, |s, ((_, x), k)| &s + &(x * k));
+                let terms: Vec<_> = terms.iter().map(|(i, k)| (get(*i), Rational::integer(*k))).collect();
+                let value = terms.iter().fold(Rational::ZERO, |s, ((_, x), k)| &s + &(x * k));
                 let terms: Vec<_> = terms.into_iter().map(|((id, _), k)| (id, k)).collect();
                 (graph.sum(&terms), value)
             }
         };
         // Numbers of hundreds of digits test nothing new.
-        if next
-            .1
-            .as_small()
-            .is_some_and(|(n, d)| n.abs() < 1 << 40 && d < 1 << 40)
-        {
+        if next.1.as_small().is_some_and(|(n, d)| n.abs() < 1 << 40 && d < 1 << 40) {
             made.push(next);
         }
     }

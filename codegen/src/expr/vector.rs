@@ -90,12 +90,7 @@ impl Graph {
     }
 
     /// Components of `v` after a rotation about one axis, by the angle of `turn` or, with `inverse`, by its negative.
-    fn rotate_by(
-        &mut self,
-        turn: &AxisRotation,
-        v: &SymbolicVector,
-        inverse: bool,
-    ) -> SymbolicVector {
+    fn rotate_by(&mut self, turn: &AxisRotation, v: &SymbolicVector, inverse: bool) -> SymbolicVector {
         let (c, s) = self.cos_sin(&turn.sum, turn.pi12);
         let s = if inverse { self.neg(s) } else { s };
         let axis = turn.axis as usize;
@@ -109,10 +104,7 @@ impl Graph {
     }
 
     /// Linear combination with rational factors.
-    pub(crate) fn linear_combination(
-        &mut self,
-        terms: impl IntoIterator<Item = (ExprId, Rational)>,
-    ) -> ExprId {
+    pub(crate) fn linear_combination(&mut self, terms: impl IntoIterator<Item = (ExprId, Rational)>) -> ExprId {
         let terms: Vec<_> = terms.into_iter().collect();
         self.sum(&terms)
     }

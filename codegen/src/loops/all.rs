@@ -35,21 +35,14 @@ impl KinematicLoops {
     ///
     /// # Errors
     /// [`DeriveError::LoopCount`] if the independent equations are not as many as the passive coordinates.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        tree: &KinematicTree,
-    ) -> Result<Self, DeriveError> {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &KinematicTree) -> Result<Self, DeriveError> {
         let (passive, active): (Vec<usize>, Vec<usize>) =
             (0..mechanism.coordinates.len()).partition(|i| mechanism.coordinates[*i].passive);
         let mut closures = loop_closures(graph, mechanism, tree)?;
         let couplings = coupling::couplings(graph, mechanism)?;
         closures.extend(couplings.closures);
         parallelogram::find_relations(graph, mechanism, &mut closures, &couplings.divided);
-        let residual: Vec<ExprId> = closures
-            .iter()
-            .flat_map(|c| c.residual.iter().copied())
-            .collect();
+        let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.iter().copied()).collect();
         // Dependent equations are dropped: first linear dependences, then others that show in numbers.
         let mut residual = independent_residuals(graph, &residual)?;
         if residual.len() > passive.len()

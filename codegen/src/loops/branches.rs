@@ -13,9 +13,7 @@
 //! follows from their quadratic characters: the sum of some of them is constant only if a product of their
 //! radicands is a square (Kummer).
 
-use modelmill_algebra::field::{
-    ExtensionElement, FieldElement, FieldNumber, MODULUS, RandomStream,
-};
+use modelmill_algebra::field::{ExtensionElement, FieldElement, FieldNumber, MODULUS, RandomStream};
 use modelmill_spec::Mechanism;
 
 use super::all::KinematicLoops;
@@ -45,11 +43,7 @@ const SUFFICIENT_DRAWS: usize = 40;
 
 /// The order in which the loops give the passive coordinates in closed form, if every root keeps its sign in all of the
 /// motion; `None` where the loops must be solved numerically.
-pub(crate) fn closed_form_plan(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    loops: &KinematicLoops,
-) -> Option<LoopPlan> {
+pub(crate) fn closed_form_plan(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Option<LoopPlan> {
     let found = plan(graph, mechanism, loops, SolvableCoordinates::Passive)?;
     if found.steps.iter().all(|step| step.solved.root.is_none()) {
         return Some(found);
@@ -73,9 +67,7 @@ pub(crate) fn root_branches(
 ) -> Result<Vec<RootBranch>, DeriveError> {
     let further = radicands(graph, outputs);
     let of_steps: usize = poses.steps.iter().map(|s| s.radicands.len()).sum();
-    let mut seen: Vec<RadicandStatistics> = (0..of_steps + further.len())
-        .map(RadicandStatistics::new)
-        .collect();
+    let mut seen: Vec<RadicandStatistics> = (0..of_steps + further.len()).map(RadicandStatistics::new).collect();
     let mut stream = RandomStream::new(SEED);
     let constants = poses.draw_constants::<MODULUS>(&mut stream)?;
     let mut kept = QuadraticCharacters::default();
@@ -84,8 +76,7 @@ pub(crate) fn root_branches(
             break;
         }
         // Coordinates of the point lie in the prime field; roots may lie in its quadratic extension.
-        let mut point: FieldPoint<ExtensionElement> =
-            poses.draw_open_point(&constants, &mut stream);
+        let mut point: FieldPoint<ExtensionElement> = poses.draw_open_point(&constants, &mut stream);
         let mut values: Vec<ExtensionElement> = Vec::new();
         // Records a radicand, and stops the walk where its root does not exist.
         let mut note = |value: Option<Vec<ExtensionElement>>| -> Option<()> {
@@ -100,9 +91,7 @@ pub(crate) fn root_branches(
                 }
                 step.solve(&mut point)?;
             }
-            further
-                .iter()
-                .try_for_each(|radicand| note(radicand.evaluate(&point)))
+            further.iter().try_for_each(|radicand| note(radicand.evaluate(&point)))
         };
         // Where a root does not exist, the radicands so far are still counted.
         let _: Option<()> = walk();
@@ -174,10 +163,7 @@ impl QuadraticCharacters {
 
     /// Whether radicand `k` is a function of independent coordinates with a sufficient number of draws.
     fn is_decided(&self, k: usize) -> bool {
-        self.draws
-            .get(k)
-            .is_some_and(|n| *n >= k + SUFFICIENT_DRAWS)
-            && !self.leaves[k]
+        self.draws.get(k).is_some_and(|n| *n >= k + SUFFICIENT_DRAWS) && !self.leaves[k]
     }
 
     /// Whether radicand `k` is independent of those before it, by elimination over the field with two elements.
@@ -246,11 +232,7 @@ impl RadicandStatistics {
         self.draws += 1;
         for (ratio, inverse) in self.ratios.iter_mut().zip(inverses) {
             let now = value * *inverse;
-            *ratio = if first {
-                Some(now)
-            } else {
-                ratio.filter(|r| *r == now)
-            };
+            *ratio = if first { Some(now) } else { ratio.filter(|r| *r == now) };
         }
     }
 

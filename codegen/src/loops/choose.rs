@@ -56,10 +56,7 @@ pub(crate) fn promising_sets(
     };
     // A set determines the loops where its derivatives have full rank.
     let settles = |unknown: &[usize]| {
-        let values = jacobian
-            .select_columns(unknown)
-            .svd(false, false)
-            .singular_values;
+        let values = jacobian.select_columns(unknown).svd(false, false).singular_values;
         values.len() == size && values.min() > 1e-6 * values.max()
     };
     let mut found = Vec::new();
@@ -126,9 +123,7 @@ fn is_probably_solvable(mut equations: Vec<(u64, Vec<(u64, u64)>)>, unknown: u64
         }
         // Otherwise a linear prismatic coordinate with a known factor is eliminated, from the equation with the fewest
         // unknowns.
-        let mut order: Vec<usize> = (0..equations.len())
-            .filter(|i| equations[*i].0 & left != 0)
-            .collect();
+        let mut order: Vec<usize> = (0..equations.len()).filter(|i| equations[*i].0 & left != 0).collect();
         order.sort_by_key(|i| (equations[*i].0 & left).count_ones());
         let chosen = order.into_iter().find_map(|i| {
             let (_, slides) = &equations[i];

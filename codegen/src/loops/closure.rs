@@ -6,10 +6,10 @@ use crate::DeriveError;
 use crate::expr::{AtomAngleSum, ExprId, Graph, coordinates_of};
 use crate::loops::coupling::CoupledCoordinate;
 use crate::loops::relation::AngleRelation;
-use crate::loops::spatial;
-use crate::loops::stretch::{
+use crate::loops::segment::{
     PathSegment, PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments,
 };
+use crate::loops::spatial;
 use crate::tree::KinematicTree;
 
 /// A loop cut open at two points that must coincide.

@@ -43,10 +43,7 @@ pub(crate) struct CouplingClosures {
 ///
 /// # Errors
 /// A [`DeriveError`] of an expression of the file that cannot be written into the graph.
-pub(crate) fn couplings(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-) -> Result<CouplingClosures, DeriveError> {
+pub(crate) fn couplings(graph: &mut Graph, mechanism: &Mechanism) -> Result<CouplingClosures, DeriveError> {
     let is_angle = |i: usize| mechanism.coordinates[i].motion.is_angle();
     // The value of every coupled coordinate: an offset plus factors times other coordinates.
     let mut values = Vec::new();
@@ -70,10 +67,7 @@ pub(crate) fn couplings(
     }
     // The common denominator of all factors by which an angle enters others.
     let mut parts: BTreeMap<ExprId, i64> = BTreeMap::new();
-    let turning = values
-        .iter()
-        .zip(&resolved)
-        .filter(|((i, _), _)| is_angle(*i));
+    let turning = values.iter().zip(&resolved).filter(|((i, _), _)| is_angle(*i));
     for (_, value) in turning {
         for (base, factor) in scaled_terms(graph, *value) {
             let denominator = factor.as_small().map_or(0, |(_, d)| d);
@@ -147,9 +141,7 @@ fn integer_multiple(
 ) -> Option<(AtomAngleSum, i32)> {
     let count = |factor: &Rational| {
         let (n, _) = factor.as_small().filter(|(_, d)| *d == 1)?;
-        i32::try_from(n)
-            .ok()
-            .filter(|n| i64::from(n.abs()) <= MOST_PARTS)
+        i32::try_from(n).ok().filter(|n| i64::from(n.abs()) <= MOST_PARTS)
     };
     // Angles are coordinates of revolute joints and constants with the unit of an angle.
     match graph.node(base) {

@@ -6,9 +6,7 @@ use modelmill_spec::Mechanism;
 
 use super::solve_step::{FieldSolveStep, LoopPlan};
 use crate::DeriveError;
-use crate::expr::{
-    Atom, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary,
-};
+use crate::expr::{Atom, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary};
 
 /// Largest number of draws until all square roots exist.
 pub(crate) const MOST_DRAWS: usize = 4000;
@@ -29,12 +27,7 @@ pub(crate) struct FieldPoseSampler {
 
 impl FieldPoseSampler {
     /// Makes a plan evaluable, for constants at which `outputs` exist as well.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        plan: LoopPlan,
-        outputs: &[ExprId],
-    ) -> Self {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, plan: LoopPlan, outputs: &[ExprId]) -> Self {
         let mut all = outputs.to_vec();
         let steps = plan
             .steps
@@ -102,10 +95,7 @@ impl FieldPoseSampler {
     }
 
     /// Closes the loops of a point; `None` if they cannot close for its independent coordinates.
-    pub(crate) fn close_loops<N: FieldNumber>(
-        &self,
-        mut point: FieldPoint<N>,
-    ) -> Option<FieldPoint<N>> {
+    pub(crate) fn close_loops<N: FieldNumber>(&self, mut point: FieldPoint<N>) -> Option<FieldPoint<N>> {
         for step in &self.steps {
             step.solve(&mut point)?;
         }
@@ -114,17 +104,10 @@ impl FieldPoseSampler {
 }
 
 /// Cosine and sine of a coordinate as `n` times the opaque angle that is its `n`-th part.
-fn divided_angle<N: FieldNumber>(
-    point: &FieldPoint<N>,
-    coordinate: usize,
-    n: i64,
-) -> Option<(N, N)> {
+fn divided_angle<N: FieldNumber>(point: &FieldPoint<N>, coordinate: usize, n: i64) -> Option<(N, N)> {
     let value = point.atom(Atom::Coordinate(coordinate))?;
     let part = value * point.rational(&Rational::new(1, n))?;
-    let mut power = (
-        point.unary(Unary::Cos, &part)?,
-        point.unary(Unary::Sin, &part)?,
-    );
+    let mut power = (point.unary(Unary::Cos, &part)?, point.unary(Unary::Sin, &part)?);
     // Addition theorem of two angles.
     let turned = |(a, b): (N, N), (c, s): (N, N)| (a * c - b * s, a * s + b * c);
     // Repeated squaring over the binary digits of n.

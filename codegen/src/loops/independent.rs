@@ -19,10 +19,7 @@ use crate::expr::{ExprId, Graph};
 ///
 /// # Errors
 /// As [`independent_functions`].
-pub(super) fn independent_residuals(
-    graph: &Graph,
-    residual: &[ExprId],
-) -> Result<Vec<ExprId>, DeriveError> {
+pub(super) fn independent_residuals(graph: &Graph, residual: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
     let columns = independent_functions(graph, residual)?;
     Ok(columns.into_iter().map(|i| residual[i]).collect())
 }
@@ -64,8 +61,7 @@ pub(super) fn sufficient_residuals(
     let mut chosen: Option<Vec<usize>> = None;
     for q in &poses {
         let (gaps, mut jacobian) = loops.linearise(q)?;
-        let passive =
-            (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
+        let passive = (0..mechanism.coordinates.len()).filter(|i| mechanism.coordinates[*i].passive);
         for (mut column, i) in jacobian.column_iter_mut().zip(passive) {
             column *= loops.coordinate_unit(i);
         }
@@ -88,8 +84,7 @@ pub(crate) fn best_conditioned_rows(matrix: &DMatrix<f64>, n: usize) -> Vec<usiz
     let mut chosen = Vec::new();
     for _ in 0..n.min(matrix.nrows()) {
         let norms: Vec<f64> = rest.row_iter().map(|row| row.norm()).collect();
-        let best =
-            (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
+        let best = (0..norms.len()).fold(0, |best, i| if norms[i] > norms[best] { i } else { best });
         if norms[best] <= 0.0 {
             break;
         }

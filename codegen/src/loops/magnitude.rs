@@ -13,9 +13,7 @@ use modelmill_spec::Mechanism;
 use num_rational::BigRational;
 use num_traits::One;
 
-use crate::expr::{
-    Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node, Unary, nominal_of, nominal_value,
-};
+use crate::expr::{Atom, EvaluationTape, ExprId, FloatDomain, Graph, Node, Unary, nominal_of, nominal_value};
 
 /// The sum of the magnitudes of all terms of some expressions at the nominal pose: the size of a mechanism's loops, m.
 /// It is 1 if there is no such expression; couplings of angles have no length and are skipped.
@@ -39,23 +37,16 @@ pub(crate) fn nominal_magnitude(graph: &mut Graph, mechanism: &Mechanism, roots:
 /// For a sum this is its share of the magnitudes of its terms. For a product, the relative errors of its factors add
 /// up: it is as exact as its worst factor, however many there are. The magnitudes of all its terms, multiplied out,
 /// would count the errors of every factor.
-pub(crate) fn significant_digits(
-    graph: &Graph,
-    mechanism: &Mechanism,
-    root: ExprId,
-) -> Option<f64> {
+pub(crate) fn significant_digits(graph: &Graph, mechanism: &Mechanism, root: ExprId) -> Option<f64> {
     // Values of all nodes, then a bound of the rounding error of each node, operands first.
     let order = operands_first(graph, root);
-    let values = EvaluationTape::new(graph, &order)
-        .evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
+    let values = EvaluationTape::new(graph, &order).evaluate(&FloatDomain(|atom| nominal_of(mechanism, atom)))?;
     let mut known: HashMap<ExprId, (f64, f64)> = HashMap::new();
     for (id, value) in order.iter().zip(values) {
         let of = |id: &ExprId| known[id];
         // Error bounds in units of the last digit, by first-order propagation.
         let changes = match graph.node(*id) {
-            Node::Sin(_)
-            | Node::Cos(_)
-            | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => 1.0,
+            Node::Sin(_) | Node::Cos(_) | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => 1.0,
             Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[*i].motion.is_length() => 1.0,
             Node::Rational(_) | Node::Atom(_) | Node::Unary(Unary::Exp, _) => value.abs(),
             Node::Unary(Unary::Abs, inner) => of(inner).1,
@@ -129,11 +120,7 @@ pub(crate) struct LoopSize {
 
 impl LoopSize {
     /// The size by the residuals of the loops; prismatic coordinates count as zero.
-    pub(crate) fn from_residual(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        residual: &[ExprId],
-    ) -> Self {
+    pub(crate) fn from_residual(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId]) -> Self {
         let mut known = HashMap::new();
         let terms: Vec<ExprId> = residual
             .iter()
@@ -171,16 +158,9 @@ impl LoopSize {
     /// The sum of the magnitudes of all terms of an expression that depends on the pose. Sines and cosines count as 1,
     /// and prismatic coordinates as at the nominal pose. Fractions have the values of the nominal pose and are scaled
     /// with the size of the loops.
-    pub(crate) fn term_magnitude(
-        &self,
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        id: ExprId,
-    ) -> ExprId {
+    pub(crate) fn term_magnitude(&self, graph: &mut Graph, mechanism: &Mechanism, id: ExprId) -> ExprId {
         let found = expression_magnitude(graph, mechanism, &mut HashMap::new(), id);
-        let out = nominal_lengths(graph, mechanism, |graph, nominal| {
-            self.scale_length(graph, nominal)
-        });
+        let out = nominal_lengths(graph, mechanism, |graph, nominal| self.scale_length(graph, nominal));
         // Prismatic coordinates are replaced by their nominal values, scaled with the loops.
         let at_any_pose = graph.substitute(&[found], &out)[0];
         let is_known = graph.atoms(&[at_any_pose]).into_iter().all(Atom::is_fixed);
@@ -193,8 +173,7 @@ impl LoopSize {
         let nominal = rounded_number(graph, nominal);
         // Its own lengths define its size, since drives between points have lengths without a loop.
         let lengths: Vec<Atom> = graph.atoms(&[found]).into_iter().collect();
-        let is_metre =
-            |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
+        let is_metre = |atom: &Atom| matches!(atom, Atom::Constant(i) if mechanism.constants[*i].unit == "m");
         let lengths: Vec<Atom> = lengths.into_iter().filter(is_metre).collect();
         let degree = length_degree(graph, mechanism, found, &lengths);
         let own = Self::from_constants(graph, mechanism, &lengths).unwrap_or(*self);
@@ -240,11 +219,7 @@ impl LoopSize {
     }
 
     /// The size that is the sum of the magnitudes of some constants; `None` if that is zero or not finite.
-    fn from_constants(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        constants: &[Atom],
-    ) -> Option<Self> {
+    fn from_constants(graph: &mut Graph, mechanism: &Mechanism, constants: &[Atom]) -> Option<Self> {
         let terms: Vec<ExprId> = constants
             .iter()
             .map(|constant| {
@@ -260,12 +235,7 @@ impl LoopSize {
 
 /// The power of the unit of length with which an expression scales, if it scales with one. `lengths` are its constants
 /// that are lengths; prismatic coordinates are lengths as well.
-fn length_degree(
-    graph: &Graph,
-    mechanism: &Mechanism,
-    id: ExprId,
-    lengths: &[Atom],
-) -> Option<i32> {
+fn length_degree(graph: &Graph, mechanism: &Mechanism, id: ExprId, lengths: &[Atom]) -> Option<i32> {
     // Binary logarithm of the magnitude with all lengths multiplied by `unit`.
     let value = |unit: f64| {
         let atom = |atom: Atom| {
@@ -280,9 +250,7 @@ fn length_degree(
     // A power gives equal integer steps for each factor of two.
     let [one, two, four] = [value(1.0)?, value(2.0)?, value(4.0)?];
     let degree = (two - one).round();
-    let is_power = [two - one, four - two]
-        .iter()
-        .all(|d| (d - degree).abs() < 1e-6);
+    let is_power = [two - one, four - two].iter().all(|d| (d - degree).abs() < 1e-6);
     #[allow(clippy::cast_possible_truncation, reason = "it is small, as just seen")]
     (is_power && degree.abs() < 100.0).then_some(degree as i32)
 }
@@ -318,14 +286,10 @@ pub(crate) fn expression_magnitude(
     }
     let found = match graph.node(id).clone() {
         Node::Rational(value) => graph.rational(value.abs()),
-        Node::Sin(_)
-        | Node::Cos(_)
-        | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
+        Node::Sin(_) | Node::Cos(_) | Node::Unary(Unary::Sign | Unary::Tanh | Unary::Sin | Unary::Cos, _) => Graph::ONE,
         // Angles count as 1, since Newton's method works with their sines and cosines; so do components of unit
         // quaternions.
-        Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => {
-            Graph::ONE
-        }
+        Node::Atom(Atom::Coordinate(i)) if !mechanism.coordinates[i].motion.is_length() => Graph::ONE,
         Node::Atom(_) | Node::Unary(Unary::Exp, _) => graph.unary(Unary::Abs, id),
         Node::Unary(Unary::Abs, inner) => expression_magnitude(graph, mechanism, known, inner),
         Node::Unary(Unary::Sqrt, inner) => {
@@ -335,12 +299,7 @@ pub(crate) fn expression_magnitude(
         Node::Sum(terms) => {
             let terms: Vec<_> = terms
                 .into_iter()
-                .map(|(term, factor)| {
-                    (
-                        expression_magnitude(graph, mechanism, known, term),
-                        factor.abs(),
-                    )
-                })
+                .map(|(term, factor)| (expression_magnitude(graph, mechanism, known, term), factor.abs()))
                 .collect();
             graph.sum(&terms)
         }

@@ -14,10 +14,10 @@ mod parallelogram;
 pub(crate) mod plan;
 mod planar;
 pub(crate) mod relation;
+pub(crate) mod segment;
 pub(crate) mod solve_step;
 pub(crate) mod solved;
 mod spatial;
-pub(crate) mod stretch;
 pub(crate) mod walk;
 mod whole_root;
 

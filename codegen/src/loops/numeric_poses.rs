@@ -82,11 +82,7 @@ impl<'a> NumericLoops<'a> {
     /// defines a size.
     pub(crate) fn coordinate_unit(&self, coordinate: usize) -> f64 {
         let moved = self.moved.iter().copied();
-        let unknown = self
-            .unknown
-            .iter()
-            .copied()
-            .zip(self.scales.iter().copied());
+        let unknown = self.unknown.iter().copied().zip(self.scales.iter().copied());
         moved
             .chain(unknown)
             .find_map(|(i, one)| (i == coordinate).then_some(one))
@@ -102,12 +98,7 @@ impl<'a> NumericLoops<'a> {
         let moves: Vec<(usize, f64)> = self
             .moved
             .iter()
-            .map(|(i, one)| {
-                (
-                    *i,
-                    one * reach * uniform_symmetric(stream) / f64::from(STEPS),
-                )
-            })
+            .map(|(i, one)| (*i, one * reach * uniform_symmetric(stream) / f64::from(STEPS)))
             .collect();
         for _ in 0..STEPS {
             for (i, dx) in &moves {

@@ -15,8 +15,7 @@ use modelmill_spec::Mechanism;
 use nalgebra::{DMatrix, DVector};
 
 use crate::expr::{
-    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Node,
-    coordinates_of, nominal_of,
+    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, FloatDomain, Graph, Node, coordinates_of, nominal_of,
 };
 use crate::loops::all::KinematicLoops;
 use crate::loops::closure::LoopClosure;
@@ -110,8 +109,7 @@ impl PriorLoops {
             .filter(|c| mechanism.coordinates[*c].passive)
             .collect();
         (!closures.is_empty()).then(|| {
-            let (passive, active) =
-                (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
+            let (passive, active) = (0..mechanism.coordinates.len()).partition(|c| settled.contains(c));
             Self(KinematicLoops {
                 active,
                 passive,
@@ -123,12 +121,7 @@ impl PriorLoops {
     }
 
     /// Whether expressions vanish wherever these loops close, tested at random points of the field.
-    fn is_zero_where_closed(
-        &self,
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        closed: &[ExprId],
-    ) -> bool {
+    fn is_zero_where_closed(&self, graph: &mut Graph, mechanism: &Mechanism, closed: &[ExprId]) -> bool {
         /// Number of points.
         const POINTS: usize = 8;
         /// Largest number of draws, since not every draw has a closed point.
@@ -148,11 +141,7 @@ impl PriorLoops {
             tape.evaluate(&poses.close_loops(open)?)
         });
         let seen: Vec<_> = points.take(POINTS).collect();
-        seen.len() == POINTS
-            && seen
-                .iter()
-                .flatten()
-                .all(|left| *left == FieldElement::ZERO)
+        seen.len() == POINTS && seen.iter().flatten().all(|left| *left == FieldElement::ZERO)
     }
 }
 
@@ -186,9 +175,7 @@ fn relations_along(
     combinations(&candidates).find(|relations| {
         let closed = substitute_relations(graph, relations, residual);
         let tape = EvaluationTape::new(graph, &closed);
-        poses
-            .iter()
-            .all(|q| is_loop_closed_at(mechanism, &tape, q, size))
+        poses.iter().all(|q| is_loop_closed_at(mechanism, &tape, q, size))
             && (mechanism.is_at_values || motion.is_zero_where_closed(graph, mechanism, &closed))
     })
 }
@@ -211,8 +198,7 @@ fn relations_of(
         .iter()
         .map(|p| angle_relations(mechanism, &poses, &given, &fixed, *p))
         .collect();
-    combinations(&candidates)
-        .find(|relations| is_loop_closed(graph, mechanism, residual, relations))
+    combinations(&candidates).find(|relations| is_loop_closed(graph, mechanism, residual, relations))
 }
 
 /// Coordinates at the closed nominal pose and at some poses around it; `None` if the loop cannot be followed there.
@@ -227,9 +213,7 @@ fn nearby_poses(
     const HALVINGS: u32 = 6;
     let loops = NumericLoops::for_unknowns(graph, mechanism, residual, unknown.to_vec(), given);
     // A loop that does not determine all unknowns would satisfy many relations by chance.
-    let nominal = loops
-        .closed_nominal_pose()
-        .filter(|q| loops.is_regular(q))?;
+    let nominal = loops.closed_nominal_pose().filter(|q| loops.is_regular(q))?;
     (0..=HALVINGS).find_map(|k| {
         let reach = PERTURBATION / f64::from(1_u32 << k);
         let mut stream = RandomStream::new(1);
@@ -385,12 +369,7 @@ fn co_rotating_angles(
 
 /// Whether the relations close the loop at every pose, tested at random points of the field. For a mechanism that is
 /// derived for its file's values alone, a numeric test is sufficient, because lengths in the file are rounded.
-fn is_loop_closed(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    residual: &[ExprId],
-    relations: &[AngleRelation],
-) -> bool {
+fn is_loop_closed(graph: &mut Graph, mechanism: &Mechanism, residual: &[ExprId], relations: &[AngleRelation]) -> bool {
     let closed = substitute_relations(graph, relations, residual);
     let tape = EvaluationTape::new(graph, &closed);
     let atoms = graph.atoms(&closed);
@@ -405,8 +384,7 @@ fn is_loop_closed(
         tape.evaluate(&point)
             .is_some_and(|values| values.iter().all(|v| *v == FieldElement::ZERO))
     });
-    closes_exactly
-        || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
+    closes_exactly || mechanism.is_at_values && is_loop_closed_numerically(graph, mechanism, residual, &tape)
 }
 
 /// Whether a loop is closed up to the last digits of the file's lengths, at random angles.
@@ -430,12 +408,7 @@ fn is_loop_closed_numerically(
 }
 
 /// Whether a loop is closed up to the last digits of the file's lengths at one pose. `size` is the size of the loop, m.
-fn is_loop_closed_at(
-    mechanism: &Mechanism,
-    closed: &EvaluationTape,
-    pose: &[f64],
-    size: f64,
-) -> bool {
+fn is_loop_closed_at(mechanism: &Mechanism, closed: &EvaluationTape, pose: &[f64], size: f64) -> bool {
     /// Relative to the size of the loop: rounding errors of lengths that other programs wrote.
     const LAST_DIGITS: f64 = 1e-11;
     let value = |atom: Atom| match atom {
@@ -447,11 +420,7 @@ fn is_loop_closed_at(
 }
 
 /// Replaces angles in sines and cosines by their relations.
-fn substitute_relations(
-    graph: &mut Graph,
-    relations: &[AngleRelation],
-    roots: &[ExprId],
-) -> Vec<ExprId> {
+fn substitute_relations(graph: &mut Graph, relations: &[AngleRelation], roots: &[ExprId]) -> Vec<ExprId> {
     let nodes: Vec<Node> = graph
         .nodes_of(roots)
         .filter(|n| matches!(n, Node::Sin(_) | Node::Cos(_)))
@@ -465,10 +434,7 @@ fn substitute_relations(
         // The angle with every related coordinate replaced.
         let (mut sum, mut pi12) = (AtomAngleSum::NONE, 0);
         for (atom, n) in angle.terms() {
-            match relations
-                .iter()
-                .find(|r| Atom::Coordinate(r.coordinate) == *atom)
-            {
+            match relations.iter().find(|r| Atom::Coordinate(r.coordinate) == *atom) {
                 Some(relation) => {
                     sum = sum.plus(&relation.sum, *n);
                     pi12 += relation.pi12 * n;

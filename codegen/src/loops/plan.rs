@@ -58,9 +58,9 @@ pub(crate) fn plan(
                 .copied()
                 .filter(|c| match unknowns {
                     SolvableCoordinates::Passive => !known.contains(c),
-                    SolvableCoordinates::Any => !todo.iter().any(|other| {
-                        other != index && loops.closures[*other].coordinates.contains(c)
-                    }),
+                    SolvableCoordinates::Any => !todo
+                        .iter()
+                        .any(|other| other != index && loops.closures[*other].coordinates.contains(c)),
                 })
                 .collect();
             coordinate_choices(graph, mechanism, closure, &free, loops, unknowns)
@@ -133,14 +133,7 @@ fn coordinate_choices(
     }
     // A choice by the structure of the equations, without deriving each set.
     if closure.chain.is_none() && n_subsets(free.len(), size) > MOST_SETS {
-        return choose::promising_sets(
-            graph,
-            mechanism,
-            &closure.equations,
-            &closure.residual,
-            free,
-            size,
-        );
+        return choose::promising_sets(graph, mechanism, &closure.equations, &closure.residual, free, size);
     }
     let mut sets = subsets(free, size);
     sets.sort_by_key(|set| set.iter().filter(|c| !loops.passive.contains(c)).count());
@@ -168,21 +161,14 @@ fn solve_jointly(
     equations.sort_unstable();
     equations.dedup();
     let residual: Vec<ExprId> = closures.iter().flat_map(|c| c.residual.clone()).collect();
-    let mut free: BTreeSet<usize> = closures
-        .iter()
-        .flat_map(|c| c.coordinates.clone())
-        .collect();
+    let mut free: BTreeSet<usize> = closures.iter().flat_map(|c| c.coordinates.clone()).collect();
     let size = closures.iter().map(|c| c.n_independent).sum();
     // Sets of unknowns, as many as the loops have independent equations.
     let sets = match unknowns {
         SolvableCoordinates::Passive => {
             free.retain(|c| !known.contains(c));
             let free: Vec<usize> = free.into_iter().collect();
-            if free.len() == size {
-                vec![free]
-            } else {
-                Vec::new()
-            }
+            if free.len() == size { vec![free] } else { Vec::new() }
         }
         SolvableCoordinates::Any => {
             let free: Vec<usize> = free.into_iter().collect();
@@ -206,9 +192,7 @@ fn single_steps(steps: Vec<(usize, ClosureSolution)>) -> Vec<PlanStep> {
 
 /// Number of subsets of some size; saturates where it overflows.
 fn n_subsets(of: usize, size: usize) -> usize {
-    (0..size).fold(1_usize, |n, i| {
-        n.saturating_mul(of.saturating_sub(i)) / (i + 1)
-    })
+    (0..size).fold(1_usize, |n, i| n.saturating_mul(of.saturating_sub(i)) / (i + 1))
 }
 
 /// All subsets of some size, in lexicographic order of the positions.
@@ -239,14 +223,9 @@ fn solve_loop(
         && closure.relations.is_empty()
     {
         let angle = AtomAngleSum::new([(Atom::Coordinate(follower.coordinate), 1)]);
-        let in_parts = follower
-            .in_parts
-            .filter(|_| unknowns == SolvableCoordinates::Any);
+        let in_parts = follower.in_parts.filter(|_| unknowns == SolvableCoordinates::Any);
         let solved = ClosureSolution {
-            angles: in_parts
-                .map(|cos_sin| (angle, cos_sin))
-                .into_iter()
-                .collect(),
+            angles: in_parts.map(|cos_sin| (angle, cos_sin)).into_iter().collect(),
             relations: Vec::new(),
             values: vec![(follower.coordinate, follower.value)],
             root: None,
@@ -255,13 +234,7 @@ fn solve_loop(
     }
     // A spatial loop is solved one coordinate after the other.
     if closure.chain.is_none() && closure.relations.is_empty() {
-        let steps = spatial::solve(
-            graph,
-            mechanism,
-            &closure.equations,
-            &closure.residual,
-            &unknown,
-        )?;
+        let steps = spatial::solve(graph, mechanism, &closure.equations, &closure.residual, &unknown)?;
         return Some(single_steps(steps));
     }
     // A planar loop: the root is first taken as positive, and again as negative if the nominal pose has that sign.

@@ -46,10 +46,7 @@ pub(crate) fn solve(
     let slides: Vec<usize> = unknown
         .iter()
         .copied()
-        .filter(|c| {
-            legs.iter()
-                .any(|leg| has_coordinate(graph, &leg.vector, *c))
-        })
+        .filter(|c| legs.iter().any(|leg| has_coordinate(graph, &leg.vector, *c)))
         .collect();
     for leg in legs {
         let inside: BTreeSet<(usize, i32)> = leg
@@ -71,10 +68,7 @@ pub(crate) fn solve(
         match groups.iter_mut().find(|g| g.unknown == inside) {
             Some(group) => {
                 let v = rotate_leg(graph, leg, &group.angle);
-                group.vector = [
-                    graph.add(group.vector[0], v[0]),
-                    graph.add(group.vector[1], v[1]),
-                ];
+                group.vector = [graph.add(group.vector[0], v[0]), graph.add(group.vector[1], v[1])];
             }
             None => {
                 let v = rotate_leg(
@@ -154,12 +148,7 @@ fn cross(graph: &mut Graph, a: [ExprId; 2], b: [ExprId; 2]) -> ExprId {
 }
 
 /// Cosine and sine of the angle that rotates `arm` onto `v`; both have the same length, whose square is `arm_squared`.
-fn rotation_between(
-    graph: &mut Graph,
-    v: [ExprId; 2],
-    arm: [ExprId; 2],
-    arm_squared: ExprId,
-) -> [ExprId; 2] {
+fn rotation_between(graph: &mut Graph, v: [ExprId; 2], arm: [ExprId; 2], arm_squared: ExprId) -> [ExprId; 2] {
     // An arm along the x axis needs only its length.
     if arm[1] == Graph::ZERO {
         return v.map(|x| graph.div(x, arm[0]));
@@ -231,14 +220,8 @@ fn intersect_circles(
     let witness = graph.mul(across, inverse);
     Some(ClosureSolution {
         angles: vec![
-            (
-                first.angle.clone(),
-                rotation_between(graph, v1, first.vector, aa),
-            ),
-            (
-                second.angle.clone(),
-                rotation_between(graph, v2, second.vector, bb),
-            ),
+            (first.angle.clone(), rotation_between(graph, v1, first.vector, aa)),
+            (second.angle.clone(), rotation_between(graph, v2, second.vector, bb)),
         ],
         relations: Vec::new(),
         values: Vec::new(),
@@ -266,11 +249,7 @@ fn intersect_circle_and_line(
         let (one, two) = (dot(graph, x, y), dot(graph, u, v));
         graph.sub(one, two)
     };
-    let (p, q, r) = (
-        gap(k1, k1, a1, a1),
-        gap(k0, k1, a0, a1),
-        gap(k0, k0, a0, a0),
-    );
+    let (p, q, r) = (gap(k1, k1, a1, a1), gap(k0, k1, a0, a1), gap(k0, k0, a0, a0));
     let at = graph.atom(Atom::Coordinate(slide));
     let (value, root) = if p == Graph::ZERO {
         // Both change with s at the same rate: the equation is linear.
@@ -316,10 +295,7 @@ fn intersect_circle_and_line(
     let v = put(graph, k0, k1).map(|x| graph.neg(x));
     let arm = put(graph, a0, a1);
     let arm_squared = dot(graph, arm, arm);
-    let angles = vec![(
-        group.angle.clone(),
-        rotation_between(graph, v, arm, arm_squared),
-    )];
+    let angles = vec![(group.angle.clone(), rotation_between(graph, v, arm, arm_squared))];
     Some(ClosureSolution {
         angles,
         relations: Vec::new(),
@@ -329,12 +305,7 @@ fn intersect_circle_and_line(
 }
 
 /// `k0 + s a + t b = 0` for two prismatic coordinates `s` and `t` with directions `a` and `b`, by Cramer's rule.
-fn intersect_lines(
-    graph: &mut Graph,
-    known: [ExprId; 2],
-    first: usize,
-    second: usize,
-) -> Option<ClosureSolution> {
+fn intersect_lines(graph: &mut Graph, known: [ExprId; 2], first: usize, second: usize) -> Option<ClosureSolution> {
     let (rest, a) = split_linear(graph, known, first)?;
     let (k0, b) = split_linear(graph, rest, second)?;
     let determinant = cross(graph, a, b);
@@ -353,11 +324,7 @@ fn intersect_lines(
 
 /// Splits a vector into the part that does not depend on a coordinate and the factor of the coordinate; `None` if the
 /// vector is not linear in it.
-fn split_linear(
-    graph: &mut Graph,
-    v: [ExprId; 2],
-    coordinate: usize,
-) -> Option<([ExprId; 2], [ExprId; 2])> {
+fn split_linear(graph: &mut Graph, v: [ExprId; 2], coordinate: usize) -> Option<([ExprId; 2], [ExprId; 2])> {
     let slope = graph.differentiate(&v, Atom::Coordinate(coordinate));
     if has_coordinate(graph, &slope, coordinate) {
         return None;

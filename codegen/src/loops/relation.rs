@@ -21,10 +21,7 @@ impl AngleRelation {
 
     /// The relation as an equation: the coordinate minus its value.
     pub(super) fn residual(&self, graph: &mut Graph) -> ExprId {
-        let (coordinate, value) = (
-            graph.atom(Atom::Coordinate(self.coordinate)),
-            self.value(graph),
-        );
+        let (coordinate, value) = (graph.atom(Atom::Coordinate(self.coordinate)), self.value(graph));
         graph.sub(coordinate, value)
     }
 }

@@ -3,9 +3,7 @@
 use modelmill_algebra::field::FieldNumber;
 
 use super::solved::ClosureSolution;
-use crate::expr::{
-    Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Unary,
-};
+use crate::expr::{Atom, AtomAngleSum, EvaluationDomain, EvaluationTape, ExprId, FieldPoint, Graph, Node, Unary};
 
 /// A sequence of steps that solves all loops, each for at most two coordinates.
 #[derive(Clone, Debug)]
@@ -74,11 +72,7 @@ impl FieldSolveStep {
             point.values.insert(Atom::Coordinate(*i), *value);
         }
         // Unknown angles are found one at a time from sums with one unknown.
-        let in_angles = |c: &usize| {
-            self.angles
-                .iter()
-                .any(|a| a.atoms().any(|x| x == Atom::Coordinate(*c)))
-        };
+        let in_angles = |c: &usize| self.angles.iter().any(|a| a.atoms().any(|x| x == Atom::Coordinate(*c)));
         let mut unknown: Vec<usize> = self.unknown.iter().copied().filter(in_angles).collect();
         while !unknown.is_empty() {
             let before = unknown.len();
@@ -97,9 +91,7 @@ impl FieldSolveStep {
                 let (c, s) = (values[2 * k], values[2 * k + 1]);
                 // The unknown angle is sign * (angle - rest).
                 let (c, s) = (c * cr + s * sr, s * cr - c * sr);
-                point
-                    .angles
-                    .insert(*atom, (c, if *sign < 0 { -s } else { s }));
+                point.angles.insert(*atom, (c, if *sign < 0 { -s } else { s }));
                 unknown.retain(|u| u != i);
             }
             // No sum has a single unknown: the step does not determine them.

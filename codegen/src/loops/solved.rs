@@ -49,14 +49,7 @@ pub(crate) fn multiply_angle(graph: &mut Graph, mut power: [ExprId; 2], n: i64) 
 }
 
 /// The vector `[x, y]` rotated by the angle with cosine `c` and sine `s`.
-pub(crate) fn rotate_vector(
-    graph: &mut Graph,
-    [c, s]: [ExprId; 2],
-    [x, y]: [ExprId; 2],
-) -> [ExprId; 2] {
+pub(crate) fn rotate_vector(graph: &mut Graph, [c, s]: [ExprId; 2], [x, y]: [ExprId; 2]) -> [ExprId; 2] {
     let products = [(c, x), (s, y), (s, x), (c, y)].map(|(a, b)| graph.mul(a, b));
-    [
-        graph.sub(products[0], products[1]),
-        graph.add(products[2], products[3]),
-    ]
+    [graph.sub(products[0], products[1]), graph.add(products[2], products[3])]
 }

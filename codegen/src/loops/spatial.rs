@@ -19,14 +19,11 @@ use modelmill_spec::Mechanism;
 
 use crate::expr::vector::{AxisRotation, push_rotation};
 use crate::expr::{
-    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary,
-    nominal_value,
+    Atom, AtomAngleSum, EvaluationTape, ExprId, FieldPoint, Graph, Node, Rational, Unary, nominal_value,
 };
 use crate::loops::magnitude;
+use crate::loops::segment::{PathSegment, PointPairPath, inverse_rotations, path_segments, sum_segments};
 use crate::loops::solved::{ClosureSolution, SignedRoot};
-use crate::loops::stretch::{
-    PathSegment, PointPairPath, inverse_rotations, path_segments, sum_segments,
-};
 use crate::loops::whole_root;
 use crate::tree::KinematicTree;
 
@@ -37,11 +34,7 @@ const SINGULAR: f64 = 1e-9;
 /// every origin along it.
 ///
 /// The equations are sorted by id and have no duplicates.
-pub(crate) fn equations(
-    graph: &mut Graph,
-    tree: &KinematicTree,
-    between: &PointPairPath,
-) -> Vec<ExprId> {
+pub(crate) fn equations(graph: &mut Graph, tree: &KinematicTree, between: &PointPairPath) -> Vec<ExprId> {
     let mut found = BTreeSet::new();
     // Components of the closing vector in a frame along the loop.
     let mut in_frame = |graph: &mut Graph, turns: &[AxisRotation]| {
@@ -65,8 +58,7 @@ pub(crate) fn equations(
         let other = path_segments(tree, between.paths[1 - side], &[], &between.at[1 - side]);
         for k in 0..path.len() {
             let child = path_segments(tree, &path[k + 1..], &[], at);
-            let mut rest: Vec<PathSegment> =
-                path_segments(tree, &path[..=k], &[], &[Graph::ZERO; 3]);
+            let mut rest: Vec<PathSegment> = path_segments(tree, &path[..=k], &[], &[Graph::ZERO; 3]);
             // The path from the joint's origin back to the root, and on to the point along the other side.
             for stretch in &mut rest {
                 stretch.vector = stretch.vector.map(|x| graph.neg(x));
@@ -188,9 +180,7 @@ fn find_eliminable_slide(
         // The factor must be known and must not vanish at the nominal pose.
         slides.into_iter().find_map(|slide| {
             let slope = graph.differentiate(&[*equation], Atom::Coordinate(slide))[0];
-            if !equation_unknowns(graph, slope, left).is_empty()
-                || !is_regular(graph, mechanism, slope)
-            {
+            if !equation_unknowns(graph, slope, left).is_empty() || !is_regular(graph, mechanism, slope) {
                 return None;
             }
             let rest = set_to_zero(graph, &[*equation], slide)[0];
@@ -229,9 +219,7 @@ fn candidate_solutions(
             .collect();
         for (i, first) in linear.iter().enumerate() {
             for second in &linear[i + 1..] {
-                solved.extend(solve_equation_pair(
-                    graph, mechanism, first, second, coordinate,
-                ));
+                solved.extend(solve_equation_pair(graph, mechanism, first, second, coordinate));
             }
         }
         solved
@@ -272,9 +260,7 @@ impl TrigonometricEquation {
         // At q = 0 the first derivative is the factor of the sine, and the second is the negative factor of the cosine.
         let slope = graph.differentiate(&[equation], atom);
         let bend = graph.differentiate(&slope, atom);
-        let [at_zero, slope, bend] =
-            set_to_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..]
-        else {
+        let [at_zero, slope, bend] = set_to_zero(graph, &[equation, slope[0], bend[0]], coordinate)[..] else {
             return None;
         };
         let cosine = graph.neg(bend);
@@ -294,12 +280,7 @@ impl TrigonometricEquation {
     }
 
     /// Solves one equation: with `r = cosine sin q - sine cos q`, `r^2 = cosine^2 + sine^2 - rest^2`.
-    fn solve(
-        &self,
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        coordinate: usize,
-    ) -> Option<ClosureSolution> {
+    fn solve(&self, graph: &mut Graph, mechanism: &Mechanism, coordinate: usize) -> Option<ClosureSolution> {
         let Self { cosine, sine, rest } = *self;
         let (c, s) = graph.cos_sin(&AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]), 0);
         let (x, y) = (graph.mul(cosine, s), graph.mul(sine, c));
@@ -337,10 +318,7 @@ impl TrigonometricEquation {
 /// The solution of an angle by its cosine and sine.
 fn angle_solution(coordinate: usize, cos_sin: [ExprId; 2]) -> ClosureSolution {
     ClosureSolution {
-        angles: vec![(
-            AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]),
-            cos_sin,
-        )],
+        angles: vec![(AtomAngleSum::new([(Atom::Coordinate(coordinate), 1)]), cos_sin)],
         relations: Vec::new(),
         values: Vec::new(),
         root: None,
@@ -476,8 +454,7 @@ fn is_zero(graph: &Graph, id: ExprId) -> bool {
             point.angles.insert(*atom, stream.next_circle_point());
         }
         // An expression with a root or a quotient that does not exist there does not count as zero.
-        tape.evaluate(&point)
-            .is_some_and(|v| v[0] == FieldElement::ZERO)
+        tape.evaluate(&point).is_some_and(|v| v[0] == FieldElement::ZERO)
     })
 }
 

@@ -83,23 +83,15 @@ struct LoopTangent {
 
 impl<'a> PoseWalk<'a> {
     /// Starts at the nominal pose; `None` if no closed pose is found there.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &'a Mechanism,
-        loops: &KinematicLoops,
-    ) -> Option<Self> {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &'a Mechanism, loops: &KinematicLoops) -> Option<Self> {
         let residual = all_residuals(loops);
         let all: Vec<usize> = (0..mechanism.coordinates.len()).collect();
         let numeric = NumericLoops::for_unknowns(graph, mechanism, &residual, all.clone(), &[]);
         let nominal = numeric.declared_nominal_pose();
         let sizes = residual_loop_sizes(graph, mechanism, loops);
         // The size of the largest loop; couplings have no length.
-        let of_lengths = loops
-            .closures
-            .iter()
-            .filter(|c| c.explicit_coordinates().is_empty());
-        let of_lengths =
-            of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
+        let of_lengths = loops.closures.iter().filter(|c| c.explicit_coordinates().is_empty());
+        let of_lengths = of_lengths.map(|c| magnitude::nominal_magnitude(graph, mechanism, &c.residual));
         let length = of_lengths.reduce(f64::max).unwrap_or(1.0);
         let mut walk = Self {
             length,
@@ -186,9 +178,7 @@ impl<'a> PoseWalk<'a> {
         let step = towards / size;
         // Random lengths keep the walk from returning to the same poses.
         let length = self.step_length(&here, &step)? * (0.65 + 0.35 * uniform_symmetric(stream));
-        let there: Vec<f64> = (0..n)
-            .map(|i| self.q[i] + length * step[i] * self.units[i])
-            .collect();
+        let there: Vec<f64> = (0..n).map(|i| self.q[i] + length * step[i] * self.units[i]).collect();
         // The step is closed; a large correction means that it was too long.
         let closed = self.close_loops(there.clone())?;
         let by = |a: &[f64], b: &[f64], i: usize| ((a[i] - b[i]) / self.units[i]).abs();
@@ -232,10 +222,7 @@ impl<'a> PoseWalk<'a> {
             for k in row..row + closure.residual.len() {
                 if closure.follower.is_some() {
                     let row = jacobian.row(k);
-                    let squares = row
-                        .iter()
-                        .zip(&self.units)
-                        .map(|(x, unit)| (x * unit).powi(2));
+                    let squares = row.iter().zip(&self.units).map(|(x, unit)| (x * unit).powi(2));
                     self.sizes[k] = squares.sum::<f64>().sqrt();
                 }
             }
@@ -321,8 +308,7 @@ impl<'a> PoseWalk<'a> {
 
     /// Whether the passive coordinates are determined by the others with a margin to singular poses.
     fn is_determined(&self) -> bool {
-        self.relative_singular_value()
-            .is_some_and(|x| x > self.dead)
+        self.relative_singular_value().is_some_and(|x| x > self.dead)
     }
 
     /// The least singular value by the passive coordinates relative to the largest.
@@ -340,11 +326,7 @@ impl<'a> PoseWalk<'a> {
 }
 
 /// The size of the loop that each of [`all_residuals`] belongs to, m; 1 for couplings.
-fn residual_loop_sizes(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    loops: &KinematicLoops,
-) -> Vec<f64> {
+fn residual_loop_sizes(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<f64> {
     let of_one = |closure: &LoopClosure| {
         let size = match closure.follower {
             Some(_) => 1.0,

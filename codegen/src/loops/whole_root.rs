@@ -83,9 +83,7 @@ fn radicand_variables(graph: &Graph, radicand: ExprId) -> Option<Vec<RadicandVar
     let is_sound = graph.nodes_of(&[radicand]).all(|node| match node {
         Node::Atom(atom) => note(*atom, false),
         Node::Sin(angle) | Node::Cos(angle) => angle.atoms().all(|atom| note(atom, true)),
-        Node::Unary(function, inner) => {
-            *function == Unary::Sqrt && matches!(graph.node(*inner), Node::Rational(_))
-        }
+        Node::Unary(function, inner) => *function == Unary::Sqrt && matches!(graph.node(*inner), Node::Rational(_)),
         _ => true,
     });
     (is_sound && !found.is_empty()).then_some(found)
@@ -108,11 +106,7 @@ fn random_line(
 }
 
 /// The point at `t` of a line; `None` where an angle has no tangent.
-fn point_on_line(
-    variables: &[RadicandVariable],
-    line: &VariableLine,
-    t: FieldElement,
-) -> Option<FieldPoint> {
+fn point_on_line(variables: &[RadicandVariable], line: &VariableLine, t: FieldElement) -> Option<FieldPoint> {
     let mut point = FieldPoint::default();
     for (variable, (from, by)) in variables.iter().zip(line) {
         let x = *from + t * *by;
@@ -130,16 +124,11 @@ fn point_on_line(
 }
 
 /// Whether the radicand is a square at all drawn points, or at none: a square times a constant is either.
-fn may_be_square(
-    tape: &EvaluationTape,
-    variables: &[RadicandVariable],
-    stream: &mut RandomStream,
-) -> bool {
+fn may_be_square(tape: &EvaluationTape, variables: &[RadicandVariable], stream: &mut RandomStream) -> bool {
     let mut seen = [0, 0];
     for _ in 0..SQUARE_TESTS {
         let line = random_line(variables, None, stream);
-        let value = point_on_line(variables, &line, FieldElement::ZERO)
-            .and_then(|point| tape.evaluate(&point));
+        let value = point_on_line(variables, &line, FieldElement::ZERO).and_then(|point| tape.evaluate(&point));
         let Some(value) = value else {
             return false;
         };
@@ -243,10 +232,7 @@ fn root_coefficients(
         return None;
     };
     let factors = &solution[..monomials.len()];
-    let first = factors
-        .iter()
-        .find(|x| **x != FieldElement::ZERO)?
-        .inverse()?;
+    let first = factors.iter().find(|x| **x != FieldElement::ZERO)?.inverse()?;
     factors
         .iter()
         .map(|x| reconstruct_rational(&[(MODULUS, (*x * first).representative())]))
@@ -286,10 +272,7 @@ fn rows_along(
     let rows = places[..=half].iter().map(|t| {
         let point = point_on_line(variables, line, *t)?;
         // Horner's scheme.
-        let value = root
-            .iter()
-            .rev()
-            .fold(FieldElement::ZERO, |sum, c| sum * *t + *c);
+        let value = root.iter().rev().fold(FieldElement::ZERO, |sum, c| sum * *t + *c);
         let value = value * at_start * cleared_by(*t, 1).inverse()?;
         let mut row: Vec<FieldElement> = monomials
             .iter()
@@ -316,11 +299,7 @@ fn series_root(square: &[FieldElement], n: usize) -> Option<Vec<FieldElement>> {
 }
 
 /// The value of a monomial at a point of the field.
-fn monomial_value(
-    variables: &[RadicandVariable],
-    powers: &RadicandMonomial,
-    point: &FieldPoint,
-) -> FieldElement {
+fn monomial_value(variables: &[RadicandVariable], powers: &RadicandMonomial, point: &FieldPoint) -> FieldElement {
     let factor = |(variable, (n, m)): (&RadicandVariable, &(usize, usize))| {
         if variable.is_angle {
             let (c, s) = point.angles[&variable.atom];
@@ -444,8 +423,7 @@ mod tests {
             let three = graph.integer(3);
             let root = graph.unary(Unary::Sqrt, three);
             let (x, y) = (graph.mul(length, c), graph.mul(length, s));
-            let sum =
-                graph.linear_combination([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
+            let sum = graph.linear_combination([(x, Rational::new(2, 3)), (y, Rational::integer(-5))]);
             let sum = graph.add(sum, length);
             graph.mul(root, sum)
         });

@@ -27,7 +27,8 @@ pub(crate) fn cost(graph: &Graph, roots: &[ExprId]) -> usize {
                 // absorbs it.
                 let n_fixed = terms.iter().filter(|(c, _)| fixed[c.index()]).count();
                 let scaled = terms.iter().filter(|(c, k)| {
-                    let absorbed = matches!(graph.node(*c), Node::Product(f) if f.iter().any(|(x, _)| fixed[x.index()]));
+                    let absorbed =
+                        matches!(graph.node(*c), Node::Product(f) if f.iter().any(|(x, _)| fixed[x.index()]));
                     !fixed[c.index()] && !k.abs().is_one() && !absorbed
                 });
                 terms.len() - n_fixed + n_fixed.min(1) - 1 + scaled.count()

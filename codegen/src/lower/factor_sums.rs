@@ -17,10 +17,7 @@ pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
         };
         // Whether the new node is used more than once, for the sums above it.
         let many = uses[id.index()] > 1;
-        shared
-            .entry(value)
-            .and_modify(|s| *s = true)
-            .or_insert(many);
+        shared.entry(value).and_modify(|s| *s = true).or_insert(many);
         value
     })
 }
@@ -29,11 +26,7 @@ pub(crate) fn factor_sums(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
 type FactoredTerm = (Rational, Vec<(ExprId, i32)>);
 
 /// A sum with its common factors taken out.
-fn factor_terms(
-    graph: &mut Graph,
-    terms: &[(ExprId, Rational)],
-    shared: &BTreeMap<ExprId, bool>,
-) -> ExprId {
+fn factor_terms(graph: &mut Graph, terms: &[(ExprId, Rational)], shared: &BTreeMap<ExprId, bool>) -> ExprId {
     let open: Vec<FactoredTerm> = terms
         .iter()
         .map(|(id, k)| {
@@ -41,9 +34,7 @@ fn factor_terms(
             let (base, inner) = graph.split_factor(*id);
             let k = k * &inner;
             match graph.node(base) {
-                Node::Product(factors) if !shared.get(&base).copied().unwrap_or(false) => {
-                    (k, factors.clone())
-                }
+                Node::Product(factors) if !shared.get(&base).copied().unwrap_or(false) => (k, factors.clone()),
                 _ => (k, vec![(base, 1)]),
             }
         })

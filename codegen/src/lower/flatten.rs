@@ -14,12 +14,9 @@ pub(crate) fn use_counts(graph: &Graph, roots: &[ExprId]) -> Vec<usize> {
     }
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if needed {
-            graph.for_each_child(
-                ExprId(u32::try_from(i).expect("graph below 4G nodes")),
-                |child| {
-                    uses[child.index()] += 1;
-                },
-            );
+            graph.for_each_child(ExprId(u32::try_from(i).expect("graph below 4G nodes")), |child| {
+                uses[child.index()] += 1;
+            });
         }
     }
     uses
@@ -42,8 +39,7 @@ pub(crate) fn rewrite_affected(
     mut rule: impl FnMut(&mut Graph, ExprId, Node) -> ExprId,
 ) -> Vec<ExprId> {
     let mut new: Vec<Option<ExprId>> = vec![None; graph.len()];
-    let rewritten =
-        |new: &[Option<ExprId>], id: ExprId| new[id.index()].expect("children come first");
+    let rewritten = |new: &[Option<ExprId>], id: ExprId| new[id.index()].expect("children come first");
     for (i, needed) in graph.reachable(roots).into_iter().enumerate() {
         if !needed {
             continue;
@@ -59,18 +55,10 @@ pub(crate) fn rewrite_affected(
         }
         // The node with its operands replaced.
         let node = match graph.node(id).clone() {
-            Node::Sum(terms) => Node::Sum(
-                terms
-                    .into_iter()
-                    .map(|(c, k)| (rewritten(&new, c), k))
-                    .collect(),
-            ),
-            Node::Product(factors) => Node::Product(
-                factors
-                    .into_iter()
-                    .map(|(c, n)| (rewritten(&new, c), n))
-                    .collect(),
-            ),
+            Node::Sum(terms) => Node::Sum(terms.into_iter().map(|(c, k)| (rewritten(&new, c), k)).collect()),
+            Node::Product(factors) => {
+                Node::Product(factors.into_iter().map(|(c, n)| (rewritten(&new, c), n)).collect())
+            }
             Node::Unary(f, c) => Node::Unary(f, rewritten(&new, c)),
             leaf => leaf,
         };
@@ -99,9 +87,8 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
     let mut once: FxHashMap<ExprId, bool> = FxHashMap::default();
     rewrite(graph, roots, |graph, id, node| {
         // Whether an operand may be merged into its user.
-        let open = |graph: &Graph, child: ExprId| {
-            once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open()
-        };
+        let open =
+            |graph: &Graph, child: ExprId| once.get(&child).copied().unwrap_or(false) && graph.node(child).is_open();
         let value = match &node {
             Node::Sum(terms) => {
                 // The factor of an inner sum is multiplied into its terms.
@@ -135,9 +122,7 @@ pub(crate) fn flatten(graph: &mut Graph, roots: &[ExprId]) -> Vec<ExprId> {
         };
         let single = uses[id.index()] == 1 && !fixed.get(id.index()).copied().unwrap_or(false);
         // A value that replaces several nodes is used more than once.
-        once.entry(value)
-            .and_modify(|o| *o = false)
-            .or_insert(single);
+        once.entry(value).and_modify(|o| *o = false).or_insert(single);
         value
     })
 }

@@ -11,9 +11,7 @@ mod share;
 #[cfg(test)]
 mod tests;
 
-pub use program::{
-    OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId,
-};
+pub use program::{OperationCount, PoseGuard, ProgramOp, ProgramStage, SINGULAR, StraightLineProgram, ValueId};
 pub(crate) use schedule::{AtomDefinition, AtomRule};
 
 use crate::expr::{ExprId, Graph};

@@ -73,11 +73,7 @@ impl ProgramOp {
     pub fn for_each_operand(&self, mut visit: impl FnMut(ValueId)) {
         match self {
             Self::Number(_) | Self::Input(_) => {}
-            Self::Add(a, b)
-            | Self::Sub(a, b)
-            | Self::Mul(a, b)
-            | Self::Div(a, b)
-            | Self::Atan2(a, b) => {
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) | Self::Atan2(a, b) => {
                 visit(*a);
                 visit(*b);
             }
@@ -196,10 +192,7 @@ pub struct OperationCount {
 
 /// Tells serde to leave out a count of zero.
 #[cfg(any(test, feature = "json"))]
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde requires a reference"
-)]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde requires a reference")]
 fn is_zero(n: &usize) -> bool {
     *n == 0
 }
@@ -265,18 +258,16 @@ impl StraightLineProgram {
         let mut places: Vec<Option<ValueId>> = vec![None; self.ops.len()];
         let mut ordered = Self::default();
         for i in order {
-            let op = self.ops[*i].clone().map_operands(|operand| {
-                places[operand.index()].expect("operands stand before what needs them")
-            });
+            let op = self.ops[*i]
+                .clone()
+                .map_operands(|operand| places[operand.index()].expect("operands stand before what needs them"));
             let place = ordered.ops.len();
             places[*i] = Some(ValueId::from_index(place));
             ordered.ops.push(op);
             ordered.stages.push(self.stages[*i]);
         }
         // Outputs and guards refer to the new positions.
-        let new = |value: &ValueId| {
-            places[value.index()].expect("outputs and guarded values are in the order")
-        };
+        let new = |value: &ValueId| places[value.index()].expect("outputs and guarded values are in the order");
         ordered.outputs = self.outputs.iter().map(new).collect();
         ordered.guards = self
             .guards

@@ -61,11 +61,7 @@ impl AtomRule {
 
 /// Writes the program for `roots`: outputs, then the expressions that must be reachable, regular (each with its size),
 /// and the operands of definitions, with the counts of `request`.
-pub(crate) fn schedule(
-    graph: &Graph,
-    roots: &[ExprId],
-    request: &LoweringRequest<'_>,
-) -> StraightLineProgram {
+pub(crate) fn schedule(graph: &Graph, roots: &[ExprId], request: &LoweringRequest<'_>) -> StraightLineProgram {
     // The roots are in the order in which the passes were given them.
     let (outputs, rest) = roots.split_at(request.outputs.len());
     let (reachable, rest) = rest.split_at(request.reachable.len());
@@ -92,10 +88,7 @@ pub(crate) fn schedule(
     }
     for pair in regular.chunks(2) {
         let [value, size] = [pair[0], pair[1]].map(|id| scheduler.value(id));
-        scheduler
-            .program
-            .guards
-            .push(PoseGuard::Regular(value, size));
+        scheduler.program.guards.push(PoseGuard::Regular(value, size));
     }
     // Outputs after guards.
     let outputs: Vec<ValueId> = outputs.iter().map(|id| scheduler.value(*id)).collect();
@@ -197,12 +190,7 @@ impl ProgramScheduler<'_> {
     }
 
     /// The value of a commutative operation, with its operands in increasing order, so that equal ones are found.
-    fn commutative(
-        &mut self,
-        op: fn(ValueId, ValueId) -> ProgramOp,
-        a: ValueId,
-        b: ValueId,
-    ) -> ValueId {
+    fn commutative(&mut self, op: fn(ValueId, ValueId) -> ProgramOp, a: ValueId, b: ValueId) -> ValueId {
         self.push_op(op(a.min(b), a.max(b)))
     }
 
@@ -282,11 +270,7 @@ impl ProgramScheduler<'_> {
     fn atom(&mut self, atom: Atom) -> ValueId {
         match self.defined.get(&atom).copied() {
             Some(AtomRule::Value(value)) => self.value(value),
-            Some(AtomRule::Turn {
-                quarters,
-                sine,
-                cosine,
-            }) => {
+            Some(AtomRule::Turn { quarters, sine, cosine }) => {
                 let (y, x) = (self.value(sine), self.value(cosine));
                 // The angle from its sine and cosine, moved to the turn of the nominal pose.
                 let angle = self.push_op(ProgramOp::Atan2(y, x));
@@ -327,10 +311,7 @@ impl ProgramScheduler<'_> {
     /// A linear combination: fixed terms first, then all others from left to right.
     fn sum(&mut self, terms: &[(ExprId, Rational)]) -> ValueId {
         // Terms of a state come after the fixed ones.
-        let (fixed, moving): (Vec<_>, Vec<_>) = terms
-            .iter()
-            .cloned()
-            .partition(|(id, _)| self.fixed[id.index()]);
+        let (fixed, moving): (Vec<_>, Vec<_>) = terms.iter().cloned().partition(|(id, _)| self.fixed[id.index()]);
         // Terms with their signs, which become additions and subtractions.
         let mut signed: Vec<(bool, ValueId)> = Vec::new();
         for (id, factor) in fixed.iter().chain(&moving) {
@@ -352,10 +333,7 @@ impl ProgramScheduler<'_> {
     /// Adds signed values. Returns whether the sum has to be negated, and its value.
     fn add_signed(&mut self, signed: &[(bool, ValueId)]) -> (bool, ValueId) {
         // The sum begins with a positive term, so that no change of sign is needed.
-        let start = signed
-            .iter()
-            .position(|(negative, _)| !negative)
-            .unwrap_or(0);
+        let start = signed.iter().position(|(negative, _)| !negative).unwrap_or(0);
         let all_negative = signed[start].0;
         let mut total = signed[start].1;
         for (i, (negative, value)) in signed.iter().enumerate() {
@@ -380,8 +358,7 @@ impl ProgramScheduler<'_> {
             return self.scheduled_value(id);
         }
         if let Node::Product(factors) = self.graph.node(id).clone() {
-            let (fixed, moving): (Vec<_>, Vec<_>) =
-                factors.iter().partition(|(f, _)| self.fixed[f.index()]);
+            let (fixed, moving): (Vec<_>, Vec<_>) = factors.iter().partition(|(f, _)| self.fixed[f.index()]);
             if !fixed.is_empty() && !moving.is_empty() {
                 let k = self.powers(&fixed);
                 let number = self.number(factor.clone());
@@ -401,8 +378,7 @@ impl ProgramScheduler<'_> {
 
     /// A product: fixed factors are multiplied first.
     fn product(&mut self, factors: &[(ExprId, i32)]) -> ValueId {
-        let (fixed, moving): (Vec<_>, Vec<_>) =
-            factors.iter().partition(|(f, _)| self.fixed[f.index()]);
+        let (fixed, moving): (Vec<_>, Vec<_>) = factors.iter().partition(|(f, _)| self.fixed[f.index()]);
         match (fixed.is_empty(), moving.is_empty()) {
             (false, false) => {
                 let k = self.powers(&fixed);

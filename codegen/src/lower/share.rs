@@ -64,10 +64,7 @@ fn pairs_of(node: &Node, fixed: &[bool], mut visit: impl FnMut(OperandPair)) {
         }
         Node::Product(factors) if factors.len() > 2 => {
             // Only factors with exponent 1 form pairs; fixed ones are multiplied once anyway.
-            let simple: Vec<_> = factors
-                .iter()
-                .filter(|(id, n)| *n == 1 && !fixed[id.index()])
-                .collect();
+            let simple: Vec<_> = factors.iter().filter(|(id, n)| *n == 1 && !fixed[id.index()]).collect();
             for (i, (a, _)) in simple.iter().enumerate() {
                 for (b, _) in &simple[i + 1..] {
                     visit(OperandPair::Factors(*a, *b));
@@ -156,11 +153,7 @@ impl PairCounts {
 }
 
 /// Rewrites all sums and products that contain one of the pairs.
-fn replace_pairs(
-    graph: &mut Graph,
-    roots: &[ExprId],
-    pairs: &BTreeSet<OperandPair>,
-) -> Vec<ExprId> {
+fn replace_pairs(graph: &mut Graph, roots: &[ExprId], pairs: &BTreeSet<OperandPair>) -> Vec<ExprId> {
     // No operand is in two pairs of a kind, so its first operand identifies a pair.
     let (mut terms_with, mut factors_with) = (FxHashMap::default(), FxHashMap::default());
     for pair in pairs {
@@ -171,12 +164,8 @@ fn replace_pairs(
     }
     // Nodes without a pair are made of the same operands as before, unless those changed.
     let is_affected = |node: &Node| match node {
-        Node::Sum(terms) => {
-            terms.len() > 2 && terms.iter().any(|(t, _)| terms_with.contains_key(t))
-        }
-        Node::Product(factors) => {
-            factors.len() > 2 && factors.iter().any(|(f, _)| factors_with.contains_key(f))
-        }
+        Node::Sum(terms) => terms.len() > 2 && terms.iter().any(|(t, _)| terms_with.contains_key(t)),
+        Node::Product(factors) => factors.len() > 2 && factors.iter().any(|(f, _)| factors_with.contains_key(f)),
         _ => false,
     };
     rewrite_affected(graph, roots, is_affected, |graph, id, node| match &node {

@@ -48,13 +48,7 @@ fn values(graph: &Graph, roots: &[ExprId], seed: u64) -> Vec<FieldElement> {
 fn every_pass_keeps_the_value_of_each_output() {
     for model in ["spidermill-paper.toml", "puma560.toml", "three_rrr.toml"] {
         let derivation = derivation(model);
-        let roots: Vec<ExprId> = derivation
-            .equations
-            .columns
-            .iter()
-            .flatten()
-            .copied()
-            .collect();
+        let roots: Vec<ExprId> = derivation.equations.columns.iter().flatten().copied().collect();
         let expected = values(&derivation.graph, &roots, 11);
         let (mut graph, mut now) = derivation.graph.compacted(&roots);
         assert!(
@@ -76,13 +70,7 @@ fn every_pass_keeps_the_value_of_each_output() {
 #[test]
 fn the_estimated_cost_is_what_the_program_counts() {
     let derivation = derivation("panda.toml");
-    let roots: Vec<ExprId> = derivation
-        .equations
-        .columns
-        .iter()
-        .flatten()
-        .copied()
-        .collect();
+    let roots: Vec<ExprId> = derivation.equations.columns.iter().flatten().copied().collect();
     let estimate = cost::cost(&derivation.graph, &roots);
     let program = super::schedule::schedule(
         &derivation.graph,

@@ -62,11 +62,7 @@ pub(crate) fn backward_recursion(
             rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
             if let Some(parent) = link.parent {
                 let wrench = to_parent(graph, style, link, side, &wrench);
-                add_wrench(
-                    graph,
-                    &mut total[JointSide::Moving as usize][parent],
-                    wrench,
-                );
+                add_wrench(graph, &mut total[JointSide::Moving as usize][parent], wrench);
             }
         }
     }
@@ -124,9 +120,7 @@ pub(crate) fn carry_wrench(
                 rows.add_joint_force(link, wrench.moment[2], wrench.force[2]);
                 (i, to_parent(graph, style, link, side, &wrench))
             };
-            at = tree.links[first]
-                .parent
-                .map(|p| (p, JointSide::Moving, wrench));
+            at = tree.links[first].parent.map(|p| (p, JointSide::Moving, wrench));
         }
     }
     rows.sum_rows(graph)
@@ -164,14 +158,8 @@ fn cross_parallel_joints(
         // The moment about z of the force at the parent's origin.
         let [px, py, _] = joint.position;
         let (x, y) = (graph.mul(px, force[1]), graph.mul(py, force[0]));
-        about_z = graph.linear_combination([
-            (about_z, Rational::ONE),
-            (x, Rational::ONE),
-            (y, Rational::MINUS_ONE),
-        ]);
-        let parent = joint
-            .parent
-            .expect("a link below the first parallel one has a parent");
+        about_z = graph.linear_combination([(about_z, Rational::ONE), (x, Rational::ONE), (y, Rational::MINUS_ONE)]);
+        let parent = joint.parent.expect("a link below the first parallel one has a parent");
         // Arms from the first joint, in its axes.
         arms.push(graph.rotate_out(&tree.links[parent].absolute, &joint.position));
         i = parent;
@@ -187,11 +175,7 @@ fn cross_parallel_joints(
     let arm = graph.add_vectors(&arms);
     let lever = graph.cross(&arm, &force);
     // The third component is the one from the loop.
-    let moment = [
-        graph.add(turned[0], lever[0]),
-        graph.add(turned[1], lever[1]),
-        about_z,
-    ];
+    let moment = [graph.add(turned[0], lever[0]), graph.add(turned[1], lever[1]), about_z];
     let wrench = SymbolicWrench { force, moment };
     (
         first,

@@ -89,13 +89,8 @@ impl BodyInertia {
         let twice = graph.scale(s, &Rational::integer(2));
         let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
         let cosine = graph.sub(Graph::ONE, ss);
-        let [ca, sm, sa, cm] = [
-            (cosine, apart),
-            (sine, mixed),
-            (sine, apart),
-            (cosine, mixed),
-        ]
-        .map(|(a, b)| graph.mul(a, b));
+        let [ca, sm, sa, cm] =
+            [(cosine, apart), (sine, mixed), (sine, apart), (cosine, mixed)].map(|(a, b)| graph.mul(a, b));
         let apart = graph.sub(ca, sm);
         let mixed = graph.add(sa, cm);
         let (xx, yy) = (graph.add(mean, apart), graph.sub(mean, apart));
@@ -186,12 +181,7 @@ pub(crate) fn wrenches(
 
 impl TreeMotion {
     /// The wrench that moves a body along with `link`, about the link's origin and in its axes.
-    pub(crate) fn wrench(
-        &self,
-        graph: &mut Graph,
-        link: usize,
-        body: &BodyInertia,
-    ) -> SymbolicWrench {
+    pub(crate) fn wrench(&self, graph: &mut Graph, link: usize, body: &BodyInertia) -> SymbolicWrench {
         wrench(graph, &self.links[link], body)
     }
 }

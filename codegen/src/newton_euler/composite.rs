@@ -9,10 +9,7 @@
 
 use modelmill_spec::{CoordinateIdx, FreeBody, TwistAxes};
 
-use super::{
-    BodyInertia, CarryDepths, InertiaDiagonal, JointSide, RecursionStyle, SymbolicWrench,
-    carry_wrench,
-};
+use super::{BodyInertia, CarryDepths, InertiaDiagonal, JointSide, RecursionStyle, SymbolicWrench, carry_wrench};
 use crate::expr::vector::{self, AxisRotation, SymbolicVector};
 use crate::expr::{ExprId, Graph, Rational};
 use crate::tree::{KinematicTree, TreeLink, free};
@@ -120,13 +117,7 @@ impl CompositeInertia {
             let (ss, sine) = (graph.mul(twice, s), graph.mul(twice, c));
             (graph.sub(Graph::ONE, ss), sine)
         };
-        let products = [
-            (cosine, apart),
-            (sine, mixed),
-            (sine, apart),
-            (cosine, mixed),
-        ]
-        .map(|(a, b)| graph.mul(a, b));
+        let products = [(cosine, apart), (sine, mixed), (sine, apart), (cosine, mixed)].map(|(a, b)| graph.mul(a, b));
         let apart = graph.sub(products[0], products[1]);
         turned.mixed[axis] = graph.add(products[2], products[3]);
         turned.square[i] = graph.add(mean, apart);
@@ -152,11 +143,7 @@ impl CompositeInertia {
         let [yz, xz, _] = self.mixed;
         SymbolicWrench {
             force: [graph.neg(y), x, Graph::ZERO],
-            moment: [
-                graph.neg(xz),
-                graph.neg(yz),
-                graph.add(self.square[0], self.square[1]),
-            ],
+            moment: [graph.neg(xz), graph.neg(yz), graph.add(self.square[0], self.square[1])],
         }
     }
 
@@ -221,10 +208,7 @@ pub(crate) fn mass_matrix(
         })
         .collect();
     // Wrenches are carried from link to link down to the base.
-    let depths = CarryDepths {
-        moments: 0,
-        forces: 0,
-    };
+    let depths = CarryDepths { moments: 0, forces: 0 };
     // Terms of every entry, added at the end.
     let mut terms = vec![vec![Vec::new(); n_coordinates]; n_coordinates];
     for (m, coordinates) in motions.iter().enumerate() {
@@ -239,14 +223,7 @@ pub(crate) fn mass_matrix(
             moments.translation_wrench(graph)
         };
         let wrench = [(m / 2, JointSide::Moving, wrench)];
-        let column = carry_wrench(
-            graph,
-            &apart,
-            style,
-            2 * n + 6 * bodies_free.len(),
-            depths,
-            wrench,
-        );
+        let column = carry_wrench(graph, &apart, style, 2 * n + 6 * bodies_free.len(), depths, wrench);
         // Forces on the free body at the base.
         for ((_, body), on_body) in bodies_free.iter().zip(column[2 * n..].chunks(6)) {
             for (c, entry) in free_body_forces(graph, body, on_body) {
@@ -305,17 +282,11 @@ fn free_body_forces(
     let moment = std::array::from_fn(|k| wrench[3 + k]);
     let force = free::from_body(graph, body, body.linear, &force);
     let moment = free::from_body(graph, body, body.angular, &moment);
-    twist_coordinates(body)
-        .into_iter()
-        .zip(force.into_iter().chain(moment))
+    twist_coordinates(body).into_iter().zip(force.into_iter().chain(moment))
 }
 
 /// Entries of the mass matrix by a free body's own motion, on and above the diagonal: row, column and value.
-fn free_body_block(
-    graph: &mut Graph,
-    body: &FreeBody,
-    carried: &CompositeInertia,
-) -> Vec<(usize, usize, ExprId)> {
+fn free_body_block(graph: &mut Graph, body: &FreeBody, carried: &CompositeInertia) -> Vec<(usize, usize, ExprId)> {
     let twist = twist_coordinates(body);
     let mut entries = Vec::new();
     for (k, d) in twist.into_iter().enumerate() {

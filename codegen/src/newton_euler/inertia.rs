@@ -2,9 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use modelmill_spec::{
-    EffectPlace, EffectTerm, ExactExpression, FramePoint, LumpedMass, Mechanism, PartInertia,
-};
+use modelmill_spec::{EffectPlace, EffectTerm, ExactExpression, FramePoint, LumpedMass, Mechanism, PartInertia};
 
 use crate::DeriveError;
 use crate::expr::{ExprId, Graph, Rational};
@@ -21,11 +19,7 @@ impl InertiaByProduct {
     ///
     /// # Errors
     /// A [`DeriveError`] of an expression that cannot be written as a polynomial in the parameters.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        tree: &KinematicTree,
-    ) -> Result<Self, DeriveError> {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &KinematicTree) -> Result<Self, DeriveError> {
         let mut by_product = Self::default();
         // Parts and lumped masses of the file.
         for part in &mechanism.parts {
@@ -72,10 +66,7 @@ impl InertiaByProduct {
     }
 
     /// Links and their inertia that belong to one product.
-    pub(crate) fn link_inertias(
-        &self,
-        product: &ParameterMonomial,
-    ) -> impl Iterator<Item = (usize, &InertiaFactors)> {
+    pub(crate) fn link_inertias(&self, product: &ParameterMonomial) -> impl Iterator<Item = (usize, &InertiaFactors)> {
         self.0
             .get(product)
             .into_iter()
@@ -107,12 +98,7 @@ impl InertiaByProduct {
     }
 
     /// Adds the elements of a part to its link; `None` is the base.
-    fn add_elements(
-        &mut self,
-        graph: &mut Graph,
-        link: Option<usize>,
-        elements: [ParameterPolynomial; ELEMENTS],
-    ) {
+    fn add_elements(&mut self, graph: &mut Graph, link: Option<usize>, elements: [ParameterPolynomial; ELEMENTS]) {
         // Parts that are fixed to the base have no effect on the motion. Their products are listed without any inertia.
         for (element, polynomial) in elements.into_iter().enumerate() {
             for (product, factor) in polynomial.0 {
@@ -140,10 +126,7 @@ fn added_point_mass(point: &FramePoint, term: &EffectTerm) -> LumpedMass {
 }
 
 /// Elements of a part about its frame's origin, as polynomials in the parameters.
-fn part_elements(
-    graph: &mut Graph,
-    inertial: &PartInertia,
-) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+fn part_elements(graph: &mut Graph, inertial: &PartInertia) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     let mut elements: [ParameterPolynomial; ELEMENTS] = Default::default();
     match inertial {
         // Linear parameters are the elements themselves, with one first moment for both balances.
@@ -159,16 +142,11 @@ fn part_elements(
                 elements[InertiaElement::MomentMoment(i).index()] = moment;
             }
             for i in 0..6 {
-                elements[InertiaElement::Inertia(i).index()] =
-                    expressions::polynomial(graph, &inertia[i])?;
+                elements[InertiaElement::Inertia(i).index()] = expressions::polynomial(graph, &inertia[i])?;
             }
         }
         // Steiner's rule from the centre of mass, plus the inertia about it.
-        PartInertia::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
+        PartInertia::AboutCentre { mass, centre, inertia } => {
             let mass = expressions::polynomial(graph, mass)?;
             let centre = polynomials(graph, centre)?;
             elements = point_elements(graph, &mass, &centre, &centre)?;
@@ -183,10 +161,7 @@ fn part_elements(
 }
 
 /// Elements of a lumped mass, which may act at different points in the two balances.
-fn lump_elements(
-    graph: &mut Graph,
-    lump: &LumpedMass,
-) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
+fn lump_elements(graph: &mut Graph, lump: &LumpedMass) -> Result<[ParameterPolynomial; ELEMENTS], DeriveError> {
     // A lumped mass may be shared by several bodies, each with its share.
     let share = Rational::from(lump.share.clone());
     let mass = expressions::polynomial(graph, &lump.mass)?.scale(&share, graph);
@@ -196,10 +171,7 @@ fn lump_elements(
 }
 
 /// Three components as polynomials in the parameters.
-fn polynomials(
-    graph: &mut Graph,
-    exact: &[ExactExpression; 3],
-) -> Result<[ParameterPolynomial; 3], DeriveError> {
+fn polynomials(graph: &mut Graph, exact: &[ExactExpression; 3]) -> Result<[ParameterPolynomial; 3], DeriveError> {
     Ok([
         expressions::polynomial(graph, &exact[0])?,
         expressions::polynomial(graph, &exact[1])?,

@@ -19,11 +19,7 @@ pub(crate) struct JointLoad {
 }
 
 /// The wrench that each link receives through its joint, about the link's origin and in its axes.
-pub(crate) fn joint_wrenches(
-    graph: &mut Graph,
-    tree: &KinematicTree,
-    loads: Vec<JointLoad>,
-) -> Vec<SymbolicWrench> {
+pub(crate) fn joint_wrenches(graph: &mut Graph, tree: &KinematicTree, loads: Vec<JointLoad>) -> Vec<SymbolicWrench> {
     let n = tree.links.len();
     // Loads with a common end are carried together.
     let mut ends: Vec<Option<usize>> = loads.iter().map(|load| load.until).collect();
@@ -45,13 +41,7 @@ pub(crate) fn joint_wrenches(
             };
             add_wrench(graph, &mut through[i], wrench);
             if let Some(parent) = link.parent {
-                let wrench = to_parent(
-                    graph,
-                    RecursionStyle::PLAIN,
-                    link,
-                    JointSide::Moving,
-                    &wrench,
-                );
+                let wrench = to_parent(graph, RecursionStyle::PLAIN, link, JointSide::Moving, &wrench);
                 add_wrench(graph, &mut total[parent], wrench);
             }
         }

@@ -135,22 +135,11 @@ impl RecursionStyle {
 }
 
 /// Components of a vector after several rotations, from its components before them.
-pub(crate) fn rotate_into_inner(
-    graph: &mut Graph,
-    turns: &[AxisRotation],
-    v: &SymbolicVector,
-) -> SymbolicVector {
+pub(crate) fn rotate_into_inner(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
     turns.iter().fold(*v, |v, turn| graph.rotate_in(turn, &v))
 }
 
 /// Components of a vector before several rotations, from its components after them.
-fn rotate_into_outer(
-    graph: &mut Graph,
-    turns: &[AxisRotation],
-    v: &SymbolicVector,
-) -> SymbolicVector {
-    turns
-        .iter()
-        .rev()
-        .fold(*v, |v, turn| graph.rotate_out(turn, &v))
+fn rotate_into_outer(graph: &mut Graph, turns: &[AxisRotation], v: &SymbolicVector) -> SymbolicVector {
+    turns.iter().rev().fold(*v, |v, turn| graph.rotate_out(turn, &v))
 }

@@ -44,21 +44,15 @@ pub(super) struct LinkMotion {
 impl LinkMotion {
     /// Computes the field from angular velocity and acceleration, entry by entry. The acceleration of the origin is
     /// zero.
-    fn from_angular_motion(
-        graph: &mut Graph,
-        omega: SymbolicVector,
-        alpha: SymbolicVector,
-    ) -> Self {
+    fn from_angular_motion(graph: &mut Graph, omega: SymbolicVector, alpha: SymbolicVector) -> Self {
         // The diagonal of [omega]x [omega]x is minus the sum of the two other squares.
         let square = omega.map(|w| graph.mul(w, w));
         let mut field = [vector::ZERO; 3];
         let mut differences = vector::ZERO;
         for i in 0..3 {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-            field[i][i] = graph.linear_combination([
-                (square[j], Rational::MINUS_ONE),
-                (square[k], Rational::MINUS_ONE),
-            ]);
+            field[i][i] =
+                graph.linear_combination([(square[j], Rational::MINUS_ONE), (square[k], Rational::MINUS_ONE)]);
             differences[i] = graph.sub(square[j], square[k]);
             let product = graph.mul(omega[i], omega[j]);
             // Entries (i, j) and (j, i) of [alpha]x are -alpha_k and alpha_k for cyclic i, j, k.
@@ -114,10 +108,7 @@ fn weighted_sum(
     atom: fn(usize) -> Atom,
     terms: impl IntoIterator<Item = (usize, Rational)>,
 ) -> ExprId {
-    let terms: Vec<_> = terms
-        .into_iter()
-        .map(|(c, k)| (graph.atom(atom(c)), k))
-        .collect();
+    let terms: Vec<_> = terms.into_iter().map(|(c, k)| (graph.atom(atom(c)), k)).collect();
     graph.sum(&terms)
 }
 
@@ -226,28 +217,19 @@ impl TreeMotion {
         // 2 omega x z slide_rate
         let slide = weighted_sum(graph, Atom::Rate, link.slides.iter().cloned());
         let twice = graph.scale(slide, &Rational::integer(2));
-        let coriolis = [
-            graph.mul(moved.omega[1], twice),
-            graph.mul(moved.omega[0], twice),
-        ];
+        let coriolis = [graph.mul(moved.omega[1], twice), graph.mul(moved.omega[0], twice)];
         let acceleration = &mut moved.acceleration;
         acceleration[0] = graph.add(acceleration[0], coriolis[0]);
         // Acceleration of the prismatic joint along z.
         acceleration[1] = graph.sub(acceleration[1], coriolis[1]);
-        let slide_acceleration =
-            weighted_sum(graph, Atom::Acceleration, link.slides.iter().cloned());
+        let slide_acceleration = weighted_sum(graph, Atom::Acceleration, link.slides.iter().cloned());
         acceleration[2] = graph.add(acceleration[2], slide_acceleration);
         moved
     }
 
     /// Acceleration, on the fixed side of the joint, of the point that is reached before the offset along the joint's
     /// axis.
-    fn acceleration_before(
-        &self,
-        graph: &mut Graph,
-        tree: &KinematicTree,
-        i: usize,
-    ) -> SymbolicVector {
+    fn acceleration_before(&self, graph: &mut Graph, tree: &KinematicTree, i: usize) -> SymbolicVector {
         let link = &tree.links[i];
         let parent = self.motion_of_link(link.parent);
         let (across, _) = self.style.split_position(link);
@@ -293,12 +275,7 @@ impl TreeMotion {
     /// parent's axes.
     ///
     /// The angular acceleration is left zero in it, so only flat bodies can be used with it.
-    pub(super) fn fixed_side_motion(
-        &self,
-        graph: &mut Graph,
-        tree: &KinematicTree,
-        i: usize,
-    ) -> Option<LinkMotion> {
+    pub(super) fn fixed_side_motion(&self, graph: &mut Graph, tree: &KinematicTree, i: usize) -> Option<LinkMotion> {
         let link = &tree.links[i];
         // Rotations by quarter turns only exchange axes.
         let quarter = |t: &crate::expr::vector::AxisRotation| t.sum.is_empty() && t.pi12 % 6 == 0;

@@ -29,12 +29,7 @@ impl ForceRows {
     }
 
     /// Adds the wrench on a free body, given in its axes and about its origin.
-    pub(super) fn add_free_body_wrench(
-        &mut self,
-        graph: &mut Graph,
-        body: &FreeBody,
-        wrench: &SymbolicWrench,
-    ) {
+    pub(super) fn add_free_body_wrench(&mut self, graph: &mut Graph, body: &FreeBody, wrench: &SymbolicWrench) {
         // Force and moment are needed in the axes in which the body's rates are given.
         let force = free::from_body(graph, body, body.linear, &wrench.force);
         let moment = free::from_body(graph, body, body.angular, &wrench.moment);
@@ -53,11 +48,7 @@ impl ForceRows {
 }
 
 /// Adds a wrench to a sum that may not exist yet.
-pub(super) fn add_wrench(
-    graph: &mut Graph,
-    total: &mut Option<SymbolicWrench>,
-    wrench: SymbolicWrench,
-) {
+pub(super) fn add_wrench(graph: &mut Graph, total: &mut Option<SymbolicWrench>, wrench: SymbolicWrench) {
     *total = Some(match *total {
         None => wrench,
         Some(there) => SymbolicWrench {
@@ -77,9 +68,6 @@ pub(super) fn moment_before_axis_offset(
     let (_, along) = style.split_position(link);
     // The offset is along z, so it changes the moments about x and y only.
     let [mx, my, mz] = wrench.moment;
-    let (x, y) = (
-        graph.mul(along, wrench.force[1]),
-        graph.mul(along, wrench.force[0]),
-    );
+    let (x, y) = (graph.mul(along, wrench.force[1]), graph.mul(along, wrench.force[0]));
     [graph.sub(mx, x), graph.add(my, y), mz]
 }

@@ -51,13 +51,7 @@ impl Derivation {
         let mut graph = self.graph.clone();
         let base = base_parameter_atoms(&mut graph, &self.reduction);
         let value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
-        dynamics(
-            &mut graph,
-            &self.mechanism,
-            &self.equations,
-            &self.closing,
-            &value,
-        )
+        dynamics(&mut graph, &self.mechanism, &self.equations, &self.closing, &value)
     }
 }
 
@@ -99,26 +93,16 @@ fn dynamics(
                   gravity: crate::expr::vector::SymbolicVector,
                   frozen: &BTreeMap<ExprId, ExprId>,
                   more: &[ExprId]| {
-        let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
-            closing.program_cost(graph, equations, outputs, frozen)
-        };
-        cheapest::best_total(
-            graph,
-            mechanism,
-            equations,
-            gravity,
-            value,
-            &weigh,
-            |graph, on_tree| {
-                let outputs = equations.project_on_active(graph, on_tree, &[]);
-                let outputs: Vec<ExprId> = outputs
-                    .into_iter()
-                    .enumerate()
-                    .map(|(a, force)| graph.add(force, more.get(a).copied().unwrap_or(Graph::ZERO)))
-                    .collect();
-                graph.substitute(&outputs, frozen)
-            },
-        )
+        let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, frozen);
+        cheapest::best_total(graph, mechanism, equations, gravity, value, &weigh, |graph, on_tree| {
+            let outputs = equations.project_on_active(graph, on_tree, &[]);
+            let outputs: Vec<ExprId> = outputs
+                .into_iter()
+                .enumerate()
+                .map(|(a, force)| graph.add(force, more.get(a).copied().unwrap_or(Graph::ZERO)))
+                .collect();
+            graph.substitute(&outputs, frozen)
+        })
     };
     // c: without gravity and accelerations. g: at standstill. The bias has all terms and ends with the Jacobian.
     let coriolis = bodies(graph, none, &unaccelerated, &[])?;
@@ -127,9 +111,8 @@ fn dynamics(
     bias.extend(projection.drive_jacobian.iter().flatten());
     let mass_matrix = mass_matrix(graph, mechanism, equations, value, &effects);
     // Each program is lowered with the motions that it does not read set to zero.
-    let mut program = |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| {
-        closing.program_at(graph, equations, outputs, frozen)
-    };
+    let mut program =
+        |outputs: &[ExprId], frozen: &BTreeMap<ExprId, ExprId>| closing.program_at(graph, equations, outputs, frozen);
     Ok(DynamicsPrograms {
         mass_matrix: program(&mass_matrix, &unaccelerated),
         coriolis: program(&coriolis, &unaccelerated),
@@ -219,8 +202,7 @@ fn mass_matrix(
         .active
         .iter()
         .map(|a| {
-            let slopes =
-                graph.differentiate(&projection.passive_accelerations, Atom::Acceleration(*a));
+            let slopes = graph.differentiate(&projection.passive_accelerations, Atom::Acceleration(*a));
             let mut column = vec![Graph::ZERO; n];
             column[*a] = Graph::ONE;
             for (p, slope) in projection.loops.passive.iter().zip(slopes) {
@@ -231,19 +213,14 @@ fn mass_matrix(
         .collect();
     // Scalar product of a row and a column.
     let combined = |graph: &mut Graph, row: &[ExprId], column: &[ExprId]| {
-        let terms: Vec<ExprId> = row
-            .iter()
-            .zip(column)
-            .map(|(a, b)| graph.mul(*a, *b))
-            .collect();
+        let terms: Vec<ExprId> = row.iter().zip(column).map(|(a, b)| graph.mul(*a, *b)).collect();
         graph.add_all(&terms)
     };
     // M is symmetric if forces and moments have the same first moments of mass.
     let inertia = equations.inertia.total_inertias(graph, value);
     let is_symmetric = inertia.values().all(|inertia| {
         (0..3).all(|i| {
-            inertia[InertiaElement::ForceMoment(i).index()]
-                == inertia[InertiaElement::MomentMoment(i).index()]
+            inertia[InertiaElement::ForceMoment(i).index()] == inertia[InertiaElement::MomentMoment(i).index()]
         })
     });
     let mut matrix = vec![vec![Graph::ZERO; n_active]; n_active];
@@ -270,9 +247,7 @@ fn mass_matrix(
             // The matrix of the tree is projected column by column; the lower triangle follows by symmetry.
             let mut found = vec![vec![Graph::ZERO; n_active]; n_active];
             for b in 0..n_active {
-                let column: Vec<ExprId> = (0..n)
-                    .map(|i| combined(graph, &of_tree[i], &motion[b]))
-                    .collect();
+                let column: Vec<ExprId> = (0..n).map(|i| combined(graph, &of_tree[i], &motion[b])).collect();
                 let projected = projection.project(graph, &column);
                 for a in 0..=b {
                     found[a][b] = projected[a];
@@ -291,16 +266,11 @@ fn mass_matrix(
     if !is_symmetric {
         let form = TotalForm::PLAIN;
         let tree = &equations.tree;
-        let frames =
-            RecursionFrames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
+        let frames = RecursionFrames::new(graph, tree, &crate::expr::vector::ZERO, form.style, false);
         let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, &frames, value);
         let on_tree = newton_euler::backward_recursion(graph, tree, form.style, n, wrenches);
         let bodies = equations.project_on_active(graph, &on_tree, &[]);
-        forces = forces
-            .iter()
-            .zip(bodies)
-            .map(|(a, b)| graph.add(*a, b))
-            .collect();
+        forces = forces.iter().zip(bodies).map(|(a, b)| graph.add(*a, b)).collect();
     }
     let slopes: Vec<Vec<ExprId>> = (0..n)
         .map(|i| graph.differentiate(&forces, Atom::Acceleration(i)))

@@ -36,8 +36,7 @@ impl Derivation {
         let all_forms = cheapest::PASSES.len();
         // The first pass of lowering only helps the others, so it is counted last.
         let lowering = [(1, 1..2), (2, 1..3), (0, 0..3)];
-        let lowering = lowering
-            .map(|(last, used)| (lower::PASSES[last].name, all_forms, &lower::PASSES[used]));
+        let lowering = lowering.map(|(last, used)| (lower::PASSES[last].name, all_forms, &lower::PASSES[used]));
         for (pass, of_forms, of_lowering) in forms.chain(lowering) {
             let [inverse_dynamics, regressor] = count_operations(self, of_forms, of_lowering)?;
             counts.push(PassCount {
@@ -76,12 +75,9 @@ fn count_operations(
         .collect();
     let value = |m: &ParameterMonomial| base.get(m).copied().unwrap_or(Graph::ZERO);
     let nothing = BTreeMap::new();
-    let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
-        closing.program_cost(graph, equations, outputs, &nothing)
-    };
+    let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
     let forces = cheapest::cheapest_total(graph, mechanism, equations, &value, of_forms, &weigh)?;
-    let columns =
-        cheapest::cheapest_columns(graph, mechanism, equations, &retained, of_forms, &weigh)?;
+    let columns = cheapest::cheapest_columns(graph, mechanism, equations, &retained, of_forms, &weigh)?;
     let regressor: Vec<ExprId> = columns.into_iter().flatten().collect();
     Ok([forces, regressor].map(|outputs| {
         let program = closing.program(graph, equations, &outputs);

@@ -136,10 +136,7 @@ pub(crate) fn cheapest_columns(
         vec![vec![axis_column]],
         vec![vec![offset_after_turn]],
     ];
-    steps.push(vec![vec![Box::new(|form| ColumnForm {
-        axial: true,
-        ..form
-    })]]);
+    steps.push(vec![vec![Box::new(|form| ColumnForm { axial: true, ..form })]]);
     // Depths to which moments and forces are carried.
     let to = |moments, forces| -> ColumnChange {
         Box::new(move |form| ColumnForm {
@@ -215,8 +212,7 @@ pub(crate) fn best_total(
             let key = (form.style, form.fixed_axes);
             let frames = written.frames_for(graph, equations, &gravity, key);
             let wrenches = form.wrenches(graph, &equations.inertia, &equations.tree, frames, value);
-            let on_tree =
-                newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
+            let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
             Ok(finish(graph, &on_tree))
         },
     )
@@ -259,10 +255,7 @@ fn total_form_steps(tree: &KinematicTree) -> Vec<ChangeFamilies<TotalForm>> {
     if !has_parallel_axes(tree) {
         steps[0].clear();
     }
-    steps.push(vec![vec![Box::new(|form| TotalForm {
-        flat: true,
-        ..form
-    })]]);
+    steps.push(vec![vec![Box::new(|form| TotalForm { flat: true, ..form })]]);
     steps.push(vec![vec![Box::new(|form| TotalForm {
         turn_ends: true,
         ..form

@@ -14,8 +14,7 @@ use crate::loops::solved::{multiply_angle, rotate_vector};
 use crate::lower::SINGULAR;
 use crate::lower::cost::cost;
 use crate::lower::{
-    AtomDefinition, AtomRule, LoweringPass, LoweringRequest, PASSES, StraightLineProgram,
-    lower_with_passes,
+    AtomDefinition, AtomRule, LoweringPass, LoweringRequest, PASSES, StraightLineProgram, lower_with_passes,
 };
 use crate::regressor::UnreducedEquations;
 use crate::tree::checks;
@@ -59,9 +58,7 @@ struct ResolvedAngle {
 /// The nearest integer number of quarter turns of an angle in rad.
 fn quarter_turns(angle: f64) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "bounded")]
-    let quarters = (angle / std::f64::consts::FRAC_PI_2)
-        .round()
-        .clamp(-1e8, 1e8) as i32;
+    let quarters = (angle / std::f64::consts::FRAC_PI_2).round().clamp(-1e8, 1e8) as i32;
     quarters
 }
 
@@ -89,14 +86,11 @@ impl PassiveClosure {
             let limit = SINGULAR * magnitude::nominal_magnitude(graph, mechanism, &[*id]);
             let is_small = |value: f64| value.abs() <= limit;
             if nominal_value(graph, mechanism, *id).is_some_and(is_small)
-                && magnitude::significant_digits(graph, mechanism, *id)
-                    .is_none_or(|left| left <= SINGULAR)
+                && magnitude::significant_digits(graph, mechanism, *id).is_none_or(|left| left <= SINGULAR)
             {
                 return Err(DeriveError::SingularNominal);
             }
-            let size = closing
-                .size
-                .determinant_magnitude(graph, mechanism, *id, SINGULAR);
+            let size = closing.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
             closing.regular.push((*id, size));
         }
         let Some(plan) = closing.plan.clone() else {
@@ -105,8 +99,7 @@ impl PassiveClosure {
         // Steps in order: each makes its unknowns known for the following ones.
         for step in &plan.steps {
             // The closed form of earlier unknowns is put into this step's expressions.
-            let mut roots: Vec<ExprId> =
-                step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
+            let mut roots: Vec<ExprId> = step.solved.angles.iter().flat_map(|(_, cs)| *cs).collect();
             roots.extend(step.solved.values.iter().map(|(_, value)| *value));
             roots.extend(step.solved.root.iter().map(|root| root.radicand));
             // Angles, then values, then the radicand, in this order.
@@ -130,12 +123,7 @@ impl PassiveClosure {
                 .reachable
                 .extend(step.solved.root.iter().map(|_| closed[closed.len() - 1]));
             // The sums of angles that the step solves for.
-            let angles: Vec<AtomAngleSum> = step
-                .solved
-                .angles
-                .iter()
-                .map(|(angle, _)| angle.clone())
-                .collect();
+            let angles: Vec<AtomAngleSum> = step.solved.angles.iter().map(|(angle, _)| angle.clone()).collect();
             // Single angles from the solved sums of this step.
             closing.resolve_angles(step.unknown.clone(), &angles, first);
             for relation in &step.solved.relations {
@@ -166,11 +154,7 @@ impl PassiveClosure {
                 let [cosine, sine] = rotate_vector(graph, [back.0, back.1], [cosine, sine]);
                 closing.definitions.push(AtomDefinition {
                     atom,
-                    rule: AtomRule::Turn {
-                        quarters,
-                        sine,
-                        cosine,
-                    },
+                    rule: AtomRule::Turn { quarters, sine, cosine },
                 });
             }
         }
@@ -181,9 +165,7 @@ impl PassiveClosure {
     pub(crate) fn add_guards(&mut self, graph: &mut Graph, mechanism: &Mechanism, more: &[ExprId]) {
         for id in more {
             if self.regular.iter().all(|(known, _)| known != id) {
-                let size = self
-                    .size
-                    .determinant_magnitude(graph, mechanism, *id, SINGULAR);
+                let size = self.size.determinant_magnitude(graph, mechanism, *id, SINGULAR);
                 self.regular.push((*id, size));
             }
         }
@@ -216,16 +198,11 @@ impl PassiveClosure {
                     continue;
                 };
                 // q = sign * (solved - rest)
-                let rest =
-                    self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
+                let rest = self.resolve_sum(&angle.plus(&AtomAngleSum::new([(*atom, *sign)]), -1), 0);
                 let mut parts = ResolvedAngle {
                     known: AtomAngleSum::NONE.plus(&rest.known, -sign),
                     pi12: -sign * rest.pi12,
-                    solved: rest
-                        .solved
-                        .into_iter()
-                        .map(|(s, n)| (s, -n * sign))
-                        .collect(),
+                    solved: rest.solved.into_iter().map(|(s, n)| (s, -n * sign)).collect(),
                 };
                 parts.solved.push((first + k, *sign));
                 self.angle_of.insert(*i, parts);
@@ -281,9 +258,9 @@ impl PassiveClosure {
             .nodes_of(roots)
             .filter_map(|node| match node {
                 Node::Sin(angle) | Node::Cos(angle)
-                    if angle.atoms().any(
-                        |a| matches!(a, Atom::Coordinate(i) if self.angle_of.contains_key(&i)),
-                    ) =>
+                    if angle
+                        .atoms()
+                        .any(|a| matches!(a, Atom::Coordinate(i) if self.angle_of.contains_key(&i))) =>
                 {
                     Some((node.clone(), angle.clone()))
                 }
@@ -306,8 +283,7 @@ impl PassiveClosure {
         let mut used = graph.atoms(roots);
         // Guards may need definitions too.
         used.extend(graph.atoms(&self.reachable));
-        let (mut found, mut left): (Vec<AtomDefinition>, _) =
-            (Vec::new(), self.definitions.clone());
+        let (mut found, mut left): (Vec<AtomDefinition>, _) = (Vec::new(), self.definitions.clone());
         loop {
             let (next, rest): (Vec<AtomDefinition>, Vec<AtomDefinition>) =
                 left.into_iter().partition(|d| used.contains(&d.atom));

@@ -127,19 +127,14 @@ pub(crate) fn programs(
     let base_expressions = base::base_expressions(graph, reduction);
     let base_parameters = plain_program(graph, &base_expressions);
     let nothing = BTreeMap::new();
-    let weigh = |graph: &mut Graph, outputs: &[ExprId]| {
-        closing.program_cost(graph, equations, outputs, &nothing)
-    };
-    let regressor =
-        cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
+    let weigh = |graph: &mut Graph, outputs: &[ExprId]| closing.program_cost(graph, equations, outputs, &nothing);
+    let regressor = cheapest::cheapest_columns(graph, mechanism, equations, &retained, passes, &weigh)?;
     let regressor = row_by_row(&regressor);
-    let inverse_dynamics =
-        cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
+    let inverse_dynamics = cheapest::cheapest_total(graph, mechanism, equations, &base_value, passes, &weigh)?;
     // The scale is needed only if lengths are in the loops.
     let slides = mechanism.coordinates.iter().any(|c| c.motion.is_length());
     let scale = (slides && !projection.loops.residual.is_empty()).then(|| {
-        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual)
-            .relative_scale(graph);
+        let scale = LoopSize::from_residual(graph, mechanism, &projection.loops.residual).relative_scale(graph);
         plain_program(graph, &[scale])
     });
     // Expressions are closed over the active coordinates and lowered.

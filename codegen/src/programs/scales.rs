@@ -12,11 +12,7 @@ use crate::loops::magnitude::expression_magnitude;
 ///
 /// The scale of a residual is the sum of the magnitudes of its terms, with a sine counted as 1. The scale of a
 /// coordinate is 1 for an angle, the sum of its residuals' scales for a length, and 0 if no loop depends on it.
-pub(crate) fn residual_scales(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-    loops: &KinematicLoops,
-) -> Vec<ExprId> {
+pub(crate) fn residual_scales(graph: &mut Graph, mechanism: &Mechanism, loops: &KinematicLoops) -> Vec<ExprId> {
     let mut known = HashMap::new();
     let residuals: Vec<ExprId> = loops
         .residual
@@ -24,11 +20,7 @@ pub(crate) fn residual_scales(
         .map(|r| expression_magnitude(graph, mechanism, &mut known, *r))
         .collect();
     // Coordinates on which each residual depends.
-    let of: Vec<Vec<usize>> = loops
-        .residual
-        .iter()
-        .map(|r| coordinates_of(graph, &[*r]))
-        .collect();
+    let of: Vec<Vec<usize>> = loops.residual.iter().map(|r| coordinates_of(graph, &[*r])).collect();
     // Residuals first, then coordinates.
     let mut scales = residuals.clone();
     for i in loops.passive.iter().chain(&loops.active) {

@@ -17,16 +17,9 @@ pub(crate) fn base_parameter_name(k: usize) -> String {
 }
 
 /// Base parameter `k` written out term by term, as a script reads it. It may refer to names of [`dependent_sums`].
-pub(crate) fn expanded_formula(
-    mechanism: &Mechanism,
-    reduction: &BaseReduction,
-    k: usize,
-) -> PrintedFormula {
+pub(crate) fn expanded_formula(mechanism: &Mechanism, reduction: &BaseReduction, k: usize) -> PrintedFormula {
     // The retained product itself.
-    let mut terms = vec![product_formula(
-        mechanism,
-        &reduction.products[reduction.retained[k]],
-    )];
+    let mut terms = vec![product_formula(mechanism, &reduction.products[reduction.retained[k]])];
     // Every dependent product contributes its factor on this retained column.
     for (at, line) in reduction.dependencies.iter().enumerate() {
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
@@ -39,10 +32,7 @@ pub(crate) fn expanded_formula(
 
 /// Sums of dependent products that others refer to: the product itself and the products that are expressed by it, as
 /// Gautier and Khalil (1990) group link by link. Each has a name and stands after the sums that it needs.
-pub(crate) fn dependent_sums(
-    mechanism: &Mechanism,
-    reduction: &BaseReduction,
-) -> Vec<(String, PrintedFormula)> {
+pub(crate) fn dependent_sums(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<(String, PrintedFormula)> {
     // Sums that others need come after those that refer to them.
     let outer_first = reduction.lines_in_dependency_order().into_iter().rev();
     let sum = |line: usize| {
@@ -81,17 +71,10 @@ fn sum_name(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Op
 }
 
 /// The contribution of a dependent product to others: the name of its sum, or the product itself.
-pub(crate) fn lumped_formulas(
-    mechanism: &Mechanism,
-    reduction: &BaseReduction,
-    line: usize,
-) -> Vec<PrintedFormula> {
+pub(crate) fn lumped_formulas(mechanism: &Mechanism, reduction: &BaseReduction, line: usize) -> Vec<PrintedFormula> {
     match sum_name(mechanism, reduction, line) {
         Some(name) => vec![PrintedFormula::name(name)],
-        None => parameter_factors(
-            mechanism,
-            &reduction.products[reduction.dependencies[line].product],
-        ),
+        None => parameter_factors(mechanism, &reduction.products[reduction.dependencies[line].product]),
     }
 }
 
@@ -108,10 +91,7 @@ pub struct BaseDenominator {
 }
 
 /// All denominators of eq. (16), each once. Powers of a constant are represented by the constant.
-pub(crate) fn denominators(
-    mechanism: &Mechanism,
-    reduction: &BaseReduction,
-) -> Vec<BaseDenominator> {
+pub(crate) fn denominators(mechanism: &Mechanism, reduction: &BaseReduction) -> Vec<BaseDenominator> {
     // A set, because many factors have the same denominator.
     let mut found: BTreeSet<TrigonometricPolynomial> = BTreeSet::new();
     let lines = reduction.dependencies.iter();
@@ -123,9 +103,7 @@ pub(crate) fn denominators(
         }
         let variables = factor.denominator.keys().flatten().map(|(v, _)| *v);
         let variables = variables.filter(|v| !matches!(v, FactorVariable::Root(_)));
-        found.extend(
-            variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])),
-        );
+        found.extend(variables.map(|v| TrigonometricPolynomial::from([(vec![(v, 1)], Rational::ONE)])));
     }
     // Denominators are printed as functions with denominator 1.
     let one = || TrigonometricPolynomial::from([(Vec::new(), Rational::ONE)]);
@@ -146,9 +124,7 @@ pub(crate) fn denominators(
             });
             PrintedFormula::product(k.abs(), factors.collect::<Vec<_>>())
         })),
-        text: RationalFunction::new(p.clone(), one())
-            .formula(mechanism)
-            .text(),
+        text: RationalFunction::new(p.clone(), one()).formula(mechanism).text(),
         value: RationalFunction::new(p, one()).expanded_formula(mechanism),
     };
     found.into_iter().map(denominator).collect()
@@ -167,10 +143,7 @@ fn parameter_factors(mechanism: &Mechanism, product: &ParameterMonomial) -> Vec<
 }
 
 /// A product of parameters as a formula.
-pub(crate) fn product_formula(
-    mechanism: &Mechanism,
-    product: &ParameterMonomial,
-) -> PrintedFormula {
+pub(crate) fn product_formula(mechanism: &Mechanism, product: &ParameterMonomial) -> PrintedFormula {
     PrintedFormula::product(Rational::ONE, parameter_factors(mechanism, product))
 }
 

@@ -70,8 +70,7 @@ pub(super) fn exchange_columns(
     let moved = perturb_constants(mechanism);
     let n_rows = columns.values.len() + columns.values.len() / 2;
     let mut sampled = |mechanism: &Mechanism| {
-        let w = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH)
-            .ok()?;
+        let w = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH).ok()?;
         DependenceFactors::new(&w, columns.units, retained, dependent)
     };
     let mut factors = sampled(&moved).or_else(|| sampled(mechanism))?;
@@ -98,8 +97,7 @@ pub(super) fn is_moderate(
     shown: &[usize],
 ) -> bool {
     let n_rows = columns.values.len() + columns.values.len() / 2;
-    let Ok(w) = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH)
-    else {
+    let Ok(w) = sample_observations(graph, mechanism, projection, columns.values, n_rows, REACH) else {
         return false;
     };
     let shares = relative_column_sizes(&w, columns.units);
@@ -162,12 +160,7 @@ struct DependenceFactors {
 
 impl DependenceFactors {
     /// `None` if the sampled columns are not finite, or if the retained columns do not determine the others.
-    fn new(
-        w: &DMatrix<f64>,
-        units: &[String],
-        retained: &[usize],
-        dependent: &[usize],
-    ) -> Option<Self> {
+    fn new(w: &DMatrix<f64>, units: &[String], retained: &[usize], dependent: &[usize]) -> Option<Self> {
         // Columns of length one, so that residuals are relative.
         let of_unit_length = |columns: &[usize]| {
             let mut picked = w.select_columns(columns);

@@ -6,11 +6,7 @@ use super::oracle::ConstantOccurrence;
 use crate::expr::{Atom, ExprId, Graph, Node, Unary};
 
 /// All ways in which constants occur in the columns and in the residuals of the loops, each once and in order.
-pub(super) fn constant_occurrences(
-    graph: &Graph,
-    outputs: &[ExprId],
-    residual: &[ExprId],
-) -> Vec<ConstantOccurrence> {
+pub(super) fn constant_occurrences(graph: &Graph, outputs: &[ExprId], residual: &[ExprId]) -> Vec<ConstantOccurrence> {
     let mut roots = outputs.to_vec();
     roots.extend(residual);
     // Atoms outside of angles, and atoms in sines and cosines.

@@ -44,24 +44,14 @@ impl DependenceStructure {
         let mut pivots = echelon.pivots.clone();
         pivots.sort_unstable();
         // Columns without a pivot depend on the retained ones.
-        let dependent: Vec<usize> = shown
-            .iter()
-            .copied()
-            .filter(|k| !pivots.contains(k))
-            .collect();
+        let dependent: Vec<usize> = shown.iter().copied().filter(|k| !pivots.contains(k)).collect();
         let wanted = dependent
             .iter()
             .flat_map(|j| pivots.iter().map(move |p| (*j, *p)))
             // Factors that vanish at random constants vanish always.
-            .filter(|(j, p)| {
-                echelon
-                    .entry(*p, *j)
-                    .is_some_and(|x| x != FieldElement::ZERO)
-            })
+            .filter(|(j, p)| echelon.entry(*p, *j).is_some_and(|x| x != FieldElement::ZERO))
             .collect();
-        let order: Vec<usize> = (order.iter().copied())
-            .filter(|k| shown.contains(k))
-            .collect();
+        let order: Vec<usize> = (order.iter().copied()).filter(|k| shown.contains(k)).collect();
         let relations = relations::find_relations(&echelon, &order, &dependent);
         Ok(Self {
             shown,
@@ -102,8 +92,7 @@ impl DependenceStructure {
             .collect();
         for written in lines {
             let j = written.column;
-            let line = (self.dependent.iter().position(|x| *x == j))
-                .expect("a written column is dependent");
+            let line = (self.dependent.iter().position(|x| *x == j)).expect("a written column is dependent");
             for (p, factor) in written.factors {
                 let factor = factor.ok_or_else(|| DeriveError::FactorNotRecovered {
                     product: name(j).text(mechanism),
@@ -118,11 +107,7 @@ impl DependenceStructure {
         }
         let products: Vec<ParameterMonomial> = self.shown.iter().map(|k| name(*k)).collect();
         Ok(BaseReduction {
-            without_effect: candidates
-                .iter()
-                .filter(|c| !products.contains(c))
-                .cloned()
-                .collect(),
+            without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
             retained: self.pivots.iter().map(|p| position(*p)).collect(),
             products,
             dependencies,
@@ -150,13 +135,8 @@ impl BaseReduction {
         for _ in 0..CONFIRMED_WITH {
             let constants = regressor.sampler.constants::<FRESH>(stream)?;
             // Random parameters, and the base parameters that eq. (7) gives for them.
-            let parameters: Vec<FieldElement<FRESH>> = self
-                .products
-                .iter()
-                .map(|_| stream.next_element())
-                .collect();
-            let mut base: Vec<FieldElement<FRESH>> =
-                self.retained.iter().map(|k| parameters[*k]).collect();
+            let parameters: Vec<FieldElement<FRESH>> = self.products.iter().map(|_| stream.next_element()).collect();
+            let mut base: Vec<FieldElement<FRESH>> = self.retained.iter().map(|k| parameters[*k]).collect();
             let factors = self
                 .factors_by(&|factor| factor.value(&constants))
                 .ok_or(DeriveError::RankChanged)?;
@@ -172,11 +152,7 @@ impl BaseReduction {
                         terms.fold(FieldElement::ZERO, |s, (k, p)| s + row[k] * p)
                     };
                     let full = sum(&mut shown.iter().copied().zip(parameters.iter().copied()));
-                    let reduced = sum(&mut self
-                        .retained
-                        .iter()
-                        .map(|k| shown[*k])
-                        .zip(base.iter().copied()));
+                    let reduced = sum(&mut self.retained.iter().map(|k| shown[*k]).zip(base.iter().copied()));
                     if full != reduced {
                         return Err(DeriveError::NotConfirmed);
                     }

@@ -39,15 +39,7 @@ pub(super) fn find_factors(
         .collect();
     let mut budget = OperationBudget::new(operations);
     let mut by = |relations: &[ColumnRelation]| {
-        factors_by_relations(
-            relations,
-            dependences,
-            regressor,
-            variables,
-            roots,
-            &mut budget,
-            stream,
-        )
+        factors_by_relations(relations, dependences, regressor, variables, roots, &mut budget, stream)
     };
     match by(&dependences.relations) {
         // Which columns are near may depend on the constants, for example with roots of either sign.
@@ -63,10 +55,7 @@ pub(super) fn n_quotients(
     variables: &[ConstantOccurrence],
     stream: &mut RandomStream,
 ) -> Result<usize, DeriveError> {
-    let direct = dependences
-        .relations
-        .iter()
-        .filter(|r| r.has_retained_only());
+    let direct = dependences.relations.iter().filter(|r| r.has_retained_only());
     let direct: Vec<ColumnRelation> = direct.cloned().collect();
     // Only relations to retained columns have factors on retained columns.
     let mut oracle = MotionFactorOracle {
@@ -108,8 +97,7 @@ fn factors_by_relations(
         Ok::<_, DeriveError>(SolvedRelations::new(chosen.iter(), factors))
     };
     // The relation to near columns comes directly after the one to retained columns.
-    let nearest =
-        (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
+    let nearest = (0..all.len()).filter(|i| all.get(i + 1).is_none_or(ColumnRelation::has_retained_only));
     let mut related = found(nearest.map(|i| all[i].clone()).collect(), stream)?;
     // A near relation may be complicated: if the first joints of an arm have no effect on all of a link, relations
     // between links divide by sines of twists, and relations to retained columns do not.
@@ -129,9 +117,7 @@ fn factors_by_relations(
     }
     let mut written = related.expanded_factors(&dependences.wanted, roots);
     // Factors that cannot be multiplied out are reconstructed from the combined relations.
-    let missing: Vec<usize> = (0..written.len())
-        .filter(|k| written[*k].is_none())
-        .collect();
+    let missing: Vec<usize> = (0..written.len()).filter(|k| written[*k].is_none()).collect();
     if !missing.is_empty() && related.is_complete() {
         let mut rest = RelationFactorOracle {
             related: &related,
@@ -168,10 +154,7 @@ struct MotionFactorOracle<'a> {
 }
 
 impl PrimeFieldOracle for MotionFactorOracle<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut RandomStream,
-    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
@@ -187,8 +170,7 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
         // One relation at a time: its columns at as many points as the survey of dependences used.
         if one_by_one < at_once {
             // Few points are enough for relations between few columns.
-            let mut open: Vec<RelationRows<P>> =
-                self.relations.iter().map(RelationRows::new).collect();
+            let mut open: Vec<RelationRows<P>> = self.relations.iter().map(RelationRows::new).collect();
             for _ in 0..self.dependences.n_points {
                 if open.iter().all(RelationRows::is_confirmed) {
                     break;
@@ -201,12 +183,9 @@ impl PrimeFieldOracle for MotionFactorOracle<'_> {
             let values = open.iter().map(RelationRows::values);
             return Ok(values.collect::<Result<Vec<_>, _>>()?.concat());
         }
-        let (echelon, _) = self.regressor.reduced_rows(
-            constants,
-            &self.dependences.pivots,
-            Some(rank),
-            &mut self.sampling,
-        )?;
+        let (echelon, _) =
+            self.regressor
+                .reduced_rows(constants, &self.dependences.pivots, Some(rank), &mut self.sampling)?;
         relations::values(self.relations, &echelon)
     }
 
@@ -228,10 +207,7 @@ struct RelationFactorOracle<'a> {
 }
 
 impl PrimeFieldOracle for RelationFactorOracle<'_> {
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut RandomStream,
-    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError> {
         self.regressor.sampler.constants(stream)
     }
 
@@ -264,9 +240,7 @@ mod tests {
 
     /// An arm of revolute joints, each with a length, a twist and an offset of its own.
     fn twisted(n: usize) -> Mechanism {
-        let mut text = String::from(
-            "schema = 1\nname = \"twisted\"\ngravity = [0, 0, \"-9.81\"]\n[constants]\n",
-        );
+        let mut text = String::from("schema = 1\nname = \"twisted\"\ngravity = [0, 0, \"-9.81\"]\n[constants]\n");
         for i in 1..n {
             writeln!(text, "a{i} = {{ value = 0.1, unit = \"m\" }}\nb{i} = {{ value = 0.{i}, unit = \"rad\" }}\nd{i} = {{ value = 0.2, unit = \"m\" }}").unwrap();
         }
@@ -293,10 +267,7 @@ mod tests {
     }
 
     /// Factors by near relations where they pay, and by relations to retained columns alone.
-    fn both(
-        mechanism: &Mechanism,
-        operations: u64,
-    ) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
+    fn both(mechanism: &Mechanism, operations: u64) -> Result<[Vec<DependentColumn>; 2], DeriveError> {
         let mut graph = Graph::new();
         let equations = crate::regressor::unreduced_equations(&mut graph, mechanism)?;
         let columns: Vec<&Vec<ExprId>> = (equations.columns.iter())
@@ -306,32 +277,21 @@ mod tests {
         let outputs: Vec<ExprId> = (0..projection.drives.len())
             .flat_map(|d| columns.iter().map(move |column| column[d]))
             .collect();
-        let regressor =
-            sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
+        let regressor = sample_regressor(&mut graph, mechanism, projection, &outputs, columns.len())?;
         let mut stream = RandomStream::new(SEED);
         let order: Vec<usize> = (0..columns.len()).collect();
-        let mut dependences =
-            DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
+        let mut dependences = DependenceStructure::find_dependences(&regressor, &order, &mut stream)?;
         let variables = constant_occurrences(&graph, &outputs, &projection.loops.residual);
         let roots = root_radicands(&graph, &outputs, &projection.loops.residual);
         let mut factors = |dependences: &DependenceStructure| {
-            find_factors(
-                dependences,
-                &regressor,
-                &variables,
-                &roots,
-                operations,
-                &mut stream,
-            )
+            find_factors(dependences, &regressor, &variables, &roots, operations, &mut stream)
         };
         let near = factors(&dependences)?;
         assert!(
             dependences.relations.iter().any(|r| !r.has_retained_only()),
             "nothing is near"
         );
-        dependences
-            .relations
-            .retain(ColumnRelation::has_retained_only);
+        dependences.relations.retain(ColumnRelation::has_retained_only);
         Ok([near, factors(&dependences)?])
     }
 
@@ -346,11 +306,6 @@ mod tests {
     #[test]
     fn what_takes_too_long_is_given_up() {
         let found = both(&twisted(4), 100_000).unwrap_err();
-        assert_eq!(
-            found,
-            DeriveError::FactorsTooLong {
-                operations: 100_000
-            }
-        );
+        assert_eq!(found, DeriveError::FactorsTooLong { operations: 100_000 });
     }
 }

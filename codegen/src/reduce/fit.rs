@@ -98,10 +98,7 @@ impl<O: PrimeFieldOracle, const P: u64> AnsatzSolver<O> for FieldSamples<P> {
                 .into_iter()
                 // The overall scale of a solution is chosen here.
                 .filter_map(|x| {
-                    let last = x[n_top..]
-                        .iter()
-                        .rev()
-                        .find(|x| **x != FieldElement::ZERO)?;
+                    let last = x[n_top..].iter().rev().find(|x| **x != FieldElement::ZERO)?;
                     let scale = last.inverse()?;
                     Some(x.iter().map(|x| (*x * scale).representative()).collect())
                 })
@@ -163,8 +160,7 @@ impl<O: PrimeFieldOracle> PrimeFields<O> {
                 all.push((modulus, residue));
             }
             // Chinese remainders: each further field allows longer coefficients.
-            let lifted: Option<Vec<Rational>> =
-                residues.iter().map(|r| reconstruct_rational(r)).collect();
+            let lifted: Option<Vec<Rational>> = residues.iter().map(|r| reconstruct_rational(r)).collect();
             if lifted.is_some() {
                 return Ok(lifted);
             }
@@ -259,15 +255,14 @@ impl FunctionShape {
             if let Some(coefficients) = fields.solve_ansatz(&ansatz, oracle, stream)? {
                 // Monomials with coefficient zero are dropped.
                 let (top, bottom) = coefficients.split_at(ansatz.numerator.len());
-                let polynomial =
-                    |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
-                        monomials
-                            .iter()
-                            .zip(values)
-                            .filter(|(_, k)| !k.is_zero())
-                            .map(|(powers, k)| (powers.clone(), k.clone()))
-                            .collect()
-                    };
+                let polynomial = |monomials: &[PowerProduct], values: &[Rational]| -> TrigonometricPolynomial {
+                    monomials
+                        .iter()
+                        .zip(values)
+                        .filter(|(_, k)| !k.is_zero())
+                        .map(|(powers, k)| (powers.clone(), k.clone()))
+                        .collect()
+                };
                 return Ok(Some(RationalFunction::new(
                     polynomial(&ansatz.numerator, top),
                     polynomial(&ansatz.denominator, bottom),
@@ -330,15 +325,13 @@ fn push_power(powers: &mut PowerProduct, variable: FactorVariable, exponent: usi
 
 /// 1, and all products of different roots.
 fn root_products(roots: &[i64]) -> Vec<PowerProduct> {
-    roots
-        .iter()
-        .fold(vec![PowerProduct::new()], |products, root| {
-            let with = products.iter().map(|p| {
-                p.iter()
-                    .copied()
-                    .chain([(FactorVariable::Root(*root), 1)])
-                    .collect::<PowerProduct>()
-            });
-            products.iter().cloned().chain(with).collect()
-        })
+    roots.iter().fold(vec![PowerProduct::new()], |products, root| {
+        let with = products.iter().map(|p| {
+            p.iter()
+                .copied()
+                .chain([(FactorVariable::Root(*root), 1)])
+                .collect::<PowerProduct>()
+        });
+        products.iter().cloned().chain(with).collect()
+    })
 }

@@ -33,9 +33,7 @@ mod support;
 use modelmill_algebra::field::RandomStream;
 use modelmill_spec::Mechanism;
 
-pub use rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
-};
+pub use rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 pub use reduction::{BaseReduction, ColumnDependency, ReductionMethod};
 
 use crate::DeriveError;
@@ -75,14 +73,7 @@ pub(crate) fn reduce(
     let outputs: Vec<ExprId> = (0..projection.drives.len())
         .flat_map(|d| effective.iter().map(move |k| columns[*k][d]))
         .collect();
-    let exact = reduce_exactly(
-        graph,
-        mechanism,
-        equations,
-        &effective,
-        &preference,
-        &outputs,
-    );
+    let exact = reduce_exactly(graph, mechanism, equations, &effective, &preference, &outputs);
     let exact = exact.and_then(|found| {
         // Loops are sampled on their complete algebraic variety, but machines live on the branch of the nominal pose.
         let is_contradicted = !projection.loops.closures.is_empty()
@@ -106,9 +97,7 @@ pub(crate) fn reduce(
         ) => {
             let order = preference.own_first.iter();
             let order: Vec<usize> = order.map(|k| effective[*k]).collect();
-            numeric::reduce(
-                graph, mechanism, projection, candidates, columns, &order, because,
-            )
+            numeric::reduce(graph, mechanism, projection, candidates, columns, &order, because)
         }
         exact => exact,
     }
@@ -133,20 +122,16 @@ fn reduce_exactly(
     let mut order = &preference.declared;
     let mut dependences = DependenceStructure::find_dependences(&regressor, order, &mut stream)?;
     if preference.own_first != preference.declared {
-        let other =
-            DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
-        let mut n_quotients = |dependences: &DependenceStructure| {
-            factors::n_quotients(dependences, &regressor, &variables, &mut stream)
-        };
+        let other = DependenceStructure::find_dependences(&regressor, &preference.own_first, &mut stream)?;
+        let mut n_quotients =
+            |dependences: &DependenceStructure| factors::n_quotients(dependences, &regressor, &variables, &mut stream);
         // The second order is used if its factors have fewer sums in denominators.
         if other.pivots != dependences.pivots && n_quotients(&other)? < n_quotients(&dependences)? {
             (order, dependences) = (&preference.own_first, other);
         }
     }
     // The same columns in double precision decide whether factors are moderate at the file's values.
-    let columns: Vec<Vec<ExprId>> = (effective.iter())
-        .map(|k| equations.columns[*k].clone())
-        .collect();
+    let columns: Vec<Vec<ExprId>> = (effective.iter()).map(|k| equations.columns[*k].clone()).collect();
     let units: Vec<String> = (effective.iter())
         .map(|k| base::product_unit(mechanism, &candidates[*k]))
         .collect();
@@ -190,13 +175,8 @@ fn reduce_exactly(
             }
         }
         // The new choice becomes the order in which columns are tried.
-        let (first, rest): (Vec<usize>, Vec<usize>) =
-            order.iter().partition(|k| exchange.retained.contains(k));
-        dependences = DependenceStructure::find_dependences(
-            &regressor,
-            &[first, rest].concat(),
-            &mut stream,
-        )?;
+        let (first, rest): (Vec<usize>, Vec<usize>) = order.iter().partition(|k| exchange.retained.contains(k));
+        dependences = DependenceStructure::find_dependences(&regressor, &[first, rest].concat(), &mut stream)?;
     }
     reduced(&dependences, &mut stream)
 }

@@ -71,8 +71,7 @@ pub(super) fn reduce(
         let limit = DEPENDENT.max(PER_OFF * states.closure_error());
         // Masses and their moments are compared at the size of the largest loop as the length.
         let sized = |k: usize| {
-            let metres =
-                length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
+            let metres = length_exponent(&base::product_unit(mechanism, &candidates[k])).unwrap_or(2);
             w.norms[k] / states.loop_size().powi(2 - metres)
         };
         let sizes: Vec<f64> = (0..columns.len()).map(sized).collect();
@@ -82,19 +81,13 @@ pub(super) fn reduce(
         let base = NumericBase::new(&w, &tried, limit);
         // Contributions below the residual of dropped columns are rounding errors.
         let rounding = (1e3 * base.most_dropped).clamp(1e-60, 1e-9);
-        let (mut found, effective) =
-            numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
+        let (mut found, effective) = numeric_reduction(mechanism, candidates, &w, &tried, &base, rounding);
         // The factors as written are checked at states that were not used.
         let further = states.next_rows(n_rows)?;
-        let residual = ObservationColumns::new(&further, columns.len())
-            .largest_residual(&found, &effective, &values);
+        let residual = ObservationColumns::new(&further, columns.len()).largest_residual(&found, &effective, &values);
         // Terms below the rounding error are dropped, each by itself.
         let left_out = rounding * base.kept.len() as f64;
-        if residual
-            <= SHOWN
-                .max(SHOWN_PER_OFF * states.closure_error())
-                .max(left_out)
-        {
+        if residual <= SHOWN.max(SHOWN_PER_OFF * states.closure_error()).max(left_out) {
             found.method = ReductionMethod::Numeric {
                 least_kept: base.least_kept,
                 most_dropped: base.most_dropped,
@@ -130,12 +123,7 @@ fn numeric_reduction(
     // Retained columns in the order of the products.
     let mut sorted = base.kept.clone();
     sorted.sort_unstable();
-    let retained_at = |k: usize| {
-        sorted
-            .iter()
-            .position(|x| *x == k)
-            .expect("a kept column is kept")
-    };
+    let retained_at = |k: usize| sorted.iter().position(|x| *x == k).expect("a kept column is kept");
     let constants = FileConstants::new(mechanism, rounding.min(1e-10));
     let mut dependencies: Vec<ColumnDependency> = Vec::new();
     for j in tried.iter().copied().filter(|j| !base.kept.contains(j)) {
@@ -158,14 +146,9 @@ fn numeric_reduction(
         });
     }
     dependencies.sort_by_key(|line| line.product);
-    let products: Vec<ParameterMonomial> =
-        effective.iter().map(|k| candidates[*k].clone()).collect();
+    let products: Vec<ParameterMonomial> = effective.iter().map(|k| candidates[*k].clone()).collect();
     let found = BaseReduction {
-        without_effect: candidates
-            .iter()
-            .filter(|c| !products.contains(c))
-            .cloned()
-            .collect(),
+        without_effect: candidates.iter().filter(|c| !products.contains(c)).cloned().collect(),
         retained: sorted.iter().map(|k| at(*k)).collect(),
         products,
         dependencies,
@@ -195,12 +178,7 @@ impl ObservationColumns {
     }
 
     /// The largest residual of a dependent column with given factors, relative to the sum of the norms of its terms.
-    fn largest_residual(
-        &self,
-        found: &BaseReduction,
-        effective: &[usize],
-        constants: &[f64],
-    ) -> f64 {
+    fn largest_residual(&self, found: &BaseReduction, effective: &[usize], constants: &[f64]) -> f64 {
         let lines = found.dependencies.iter().zip(found.factors(constants));
         let shares = lines.map(|(line, factors)| {
             let product = effective[line.product];
@@ -220,11 +198,7 @@ impl ObservationColumns {
 
 /// Euclidean norm, in double precision.
 fn norm(column: &[BigFloat]) -> f64 {
-    column
-        .iter()
-        .map(|x| x.to_f64().powi(2))
-        .sum::<f64>()
-        .sqrt()
+    column.iter().map(|x| x.to_f64().powi(2)).sum::<f64>().sqrt()
 }
 
 /// Scalar product with all digits.
@@ -328,20 +302,16 @@ pub(super) fn is_contradicted(
     };
     let largest = w.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
     let factors = found.factors(&constants);
-    found
-        .dependencies
-        .iter()
-        .zip(&factors)
-        .any(|(line, factors)| {
-            let mut left = column(line.product).into_owned();
-            let mut size = left.norm();
-            for (k, factor) in factors {
-                let term = column(found.retained[*k]) * *factor;
-                size += term.norm();
-                left -= term;
-            }
-            left.norm() > WRONG * size && left.norm() > DEPENDENT * largest
-        })
+    found.dependencies.iter().zip(&factors).any(|(line, factors)| {
+        let mut left = column(line.product).into_owned();
+        let mut size = left.norm();
+        for (k, factor) in factors {
+            let term = column(found.retained[*k]) * *factor;
+            size += term.norm();
+            left -= term;
+        }
+        left.norm() > WRONG * size && left.norm() > DEPENDENT * largest
+    })
 }
 
 /// The observation matrix W of eq. (9) at random states around the nominal pose, with a few more rows than `wanted`.
@@ -357,16 +327,10 @@ pub(super) fn sample_observations(
     farthest: f64,
 ) -> Result<DMatrix<f64>, DeriveError> {
     let n_drives = projection.drives.len();
-    let outputs: Vec<ExprId> = (0..n_drives)
-        .flat_map(|d| columns.iter().map(move |c| c[d]))
-        .collect();
+    let outputs: Vec<ExprId> = (0..n_drives).flat_map(|d| columns.iter().map(move |c| c[d])).collect();
     let loops = NumericLoops::new(graph, mechanism, &projection.loops.residual);
-    let [rates, accelerations, outputs] = [
-        &projection.passive_rates,
-        &projection.passive_accelerations,
-        &outputs,
-    ]
-    .map(|roots| EvaluationTape::new(graph, roots));
+    let [rates, accelerations, outputs] = [&projection.passive_rates, &projection.passive_accelerations, &outputs]
+        .map(|roots| EvaluationTape::new(graph, roots));
     let mut stream = RandomStream::new(SEED);
     let n_coordinates = mechanism.coordinates.len();
     let mut rows: Vec<f64> = Vec::new();
@@ -389,9 +353,7 @@ pub(super) fn sample_observations(
                 .collect()
         };
         let (mut qd, mut qdd) = (moving(2.0), moving(5.0));
-        let load: Vec<f64> = (0..n_drives)
-            .map(|_| 100.0 * uniform_symmetric(&mut stream))
-            .collect();
+        let load: Vec<f64> = (0..n_drives).map(|_| 100.0 * uniform_symmetric(&mut stream)).collect();
         let evaluate = |tape: &EvaluationTape, qd: &[f64], qdd: &[f64]| {
             tape.evaluate(&FloatDomain(|atom: Atom| match atom {
                 Atom::Constant(i) => mechanism.constants[i].value,
@@ -428,11 +390,7 @@ pub(super) fn sample_observations(
     if n_points < wanted {
         return Err(DeriveError::NoPointFound { draws: tries });
     }
-    Ok(DMatrix::from_row_slice(
-        n_points * n_drives,
-        columns.len(),
-        &rows,
-    ))
+    Ok(DMatrix::from_row_slice(n_points * n_drives, columns.len(), &rows))
 }
 
 #[cfg(test)]
@@ -459,10 +417,7 @@ mod tests {
             let mut graph = Graph::new();
             let found = unreduced_equations(&mut graph, &mechanism).expect("equations");
             let exact = crate::reduce::reduce(&mut graph, &mechanism, &found).expect("a base");
-            assert!(
-                matches!(exact.method, ReductionMethod::Exact { .. }),
-                "{name}"
-            );
+            assert!(matches!(exact.method, ReductionMethod::Exact { .. }), "{name}");
             let order: Vec<usize> = (0..found.columns.len())
                 .filter(|k| found.columns[*k].iter().any(|x| *x != Graph::ZERO))
                 .collect();
@@ -510,11 +465,7 @@ mod tests {
     /// factors are constants of the file, without a decimal point.
     #[test]
     fn overconstrained_and_symmetric_loops() {
-        for (name, rank) in [
-            ("bricard_trihedral", 22),
-            ("bricard_regular", 19),
-            ("sarrus", 5),
-        ] {
+        for (name, rank) in [("bricard_trihedral", 22), ("bricard_regular", 19), ("sarrus", 5)] {
             let found = crate::derive(&judged(name, &[])).expect("a derivation");
             assert_eq!(found.reduction.retained.len(), rank, "{name}");
             let ReductionMethod::Numeric {
@@ -532,11 +483,7 @@ mod tests {
                 continue;
             }
             for base in found.base_parameters() {
-                assert!(
-                    !base.expression.contains('.'),
-                    "{name}: {}",
-                    base.expression
-                );
+                assert!(!base.expression.contains('.'), "{name}: {}", base.expression);
             }
         }
     }
@@ -545,10 +492,7 @@ mod tests {
     /// exact loop, and the residual shows the rounding.
     #[test]
     fn rounded_lengths_keep_the_base() {
-        let rounded = [(
-            r#"xyz = ["-(a)", 0, 0]"#,
-            r#"xyz = ["-0.4000000003", 0, 0]"#,
-        )];
+        let rounded = [(r#"xyz = ["-(a)", 0, 0]"#, r#"xyz = ["-0.4000000003", 0, 0]"#)];
         let found = crate::derive(&judged("bricard_regular", &rounded)).expect("a derivation");
         assert_eq!(found.reduction.retained.len(), 19);
         let ReductionMethod::Numeric { residual, .. } = found.reduction.method else {

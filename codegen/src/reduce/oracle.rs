@@ -11,10 +11,7 @@ pub(crate) trait PrimeFieldOracle {
     ///
     /// # Errors
     /// [`DeriveError::NoPointFound`] if there are no such constants.
-    fn constants<const P: u64>(
-        &self,
-        stream: &mut RandomStream,
-    ) -> Result<FieldPoint<FieldElement<P>>, DeriveError>;
+    fn constants<const P: u64>(&self, stream: &mut RandomStream) -> Result<FieldPoint<FieldElement<P>>, DeriveError>;
     /// Values of all functions for given constants.
     ///
     /// # Errors
@@ -53,9 +50,7 @@ impl OperationBudget {
     pub(super) fn spend(&mut self, operations: usize) -> Result<(), DeriveError> {
         let operations = u64::try_from(operations).unwrap_or(u64::MAX);
         let left = self.left.checked_sub(operations);
-        self.left = left.ok_or(DeriveError::FactorsTooLong {
-            operations: self.all,
-        })?;
+        self.left = left.ok_or(DeriveError::FactorsTooLong { operations: self.all })?;
         Ok(())
     }
 }

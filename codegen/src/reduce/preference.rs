@@ -41,11 +41,9 @@ pub(super) fn retention_preference(
         .retain
         .iter()
         .filter_map(|powers| {
-            let wanted = powers
-                .iter()
-                .fold(ParameterMonomial::default(), |m, (p, n)| {
-                    m.times(&ParameterMonomial(vec![(p.0, *n)]))
-                });
+            let wanted = powers.iter().fold(ParameterMonomial::default(), |m, (p, n)| {
+                m.times(&ParameterMonomial(vec![(p.0, *n)]))
+            });
             (0..effective.len()).find(|k| *product(*k) == wanted)
         })
         .collect();
@@ -65,9 +63,7 @@ pub(super) fn retention_preference(
             last_own.extend(one.bodies.iter().map(|body| (*body, k)));
         }
     }
-    let mut others: Vec<usize> = (0..effective.len())
-        .filter(|k| !named.contains(k))
-        .collect();
+    let mut others: Vec<usize> = (0..effective.len()).filter(|k| !named.contains(k)).collect();
     let declared = [named.as_slice(), &others].concat();
     // A distant product comes after the last own product of all its bodies.
     others.sort_by_key(|&k| {

@@ -27,21 +27,16 @@ pub enum FactorVariable {
 
 impl FactorVariable {
     /// Its value at a point of the field.
-    pub(crate) fn value<const P: u64>(
-        self,
-        point: &FieldPoint<FieldElement<P>>,
-    ) -> Option<FieldElement<P>> {
+    pub(crate) fn value<const P: u64>(self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         // Sine and cosine of a constant are drawn independently of its value.
         match self {
             Self::Constant(i) => point.values.get(&Atom::Constant(i)).copied(),
             Self::Cos(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.0),
             Self::Sin(i) => point.angles.get(&Atom::Constant(i)).map(|cs| cs.1),
             // Both signs of the root are possible; the point has chosen one.
-            Self::Root(n) => crate::expr::EvaluationDomain::unary(
-                point,
-                crate::expr::Unary::Sqrt,
-                &FieldElement::from_i64(n),
-            ),
+            Self::Root(n) => {
+                crate::expr::EvaluationDomain::unary(point, crate::expr::Unary::Sqrt, &FieldElement::from_i64(n))
+            }
         }
     }
 
@@ -59,16 +54,8 @@ impl FactorVariable {
     pub fn expression(self, graph: &mut Graph) -> ExprId {
         match self {
             Self::Constant(i) => graph.atom(Atom::Constant(i)),
-            Self::Cos(i) => {
-                graph
-                    .cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0)
-                    .0
-            }
-            Self::Sin(i) => {
-                graph
-                    .cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0)
-                    .1
-            }
+            Self::Cos(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).0,
+            Self::Sin(i) => graph.cos_sin(&AtomAngleSum::new([(Atom::Constant(i), 1)]), 0).1,
             Self::Root(n) => {
                 let radicand = graph.integer(n);
                 graph.unary(crate::expr::Unary::Sqrt, radicand)
@@ -109,10 +96,7 @@ impl RationalFunction {
     }
 
     /// Normalises a quotient; the denominator must not be zero.
-    pub(crate) fn new(
-        mut numerator: TrigonometricPolynomial,
-        mut denominator: TrigonometricPolynomial,
-    ) -> Self {
+    pub(crate) fn new(mut numerator: TrigonometricPolynomial, mut denominator: TrigonometricPolynomial) -> Self {
         assert!(!denominator.is_empty(), "a denominator is not zero");
         if numerator.is_empty() {
             // A numerator without terms is zero.
@@ -146,24 +130,15 @@ impl RationalFunction {
         };
         (numerator, denominator) = (strip(numerator), strip(denominator));
         // The denominator gets coprime integer coefficients, the first of them positive.
-        let mut content = denominator
-            .values()
-            .fold(Rational::ZERO, |c, k| c.content_with(k));
-        if denominator
-            .values()
-            .next_back()
-            .is_some_and(Rational::is_negative)
-        {
+        let mut content = denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
+        if denominator.values().next_back().is_some_and(Rational::is_negative) {
             content = -&content;
         }
         let inverse = content.recip();
         for k in numerator.values_mut().chain(denominator.values_mut()) {
             *k = &*k * &inverse;
         }
-        Self {
-            numerator,
-            denominator,
-        }
+        Self { numerator, denominator }
     }
 
     /// Whether it is 0.
@@ -188,10 +163,7 @@ impl RationalFunction {
     }
 
     /// Its value at a point of the field; `None` where the denominator vanishes.
-    pub(crate) fn value<const P: u64>(
-        &self,
-        point: &FieldPoint<FieldElement<P>>,
-    ) -> Option<FieldElement<P>> {
+    pub(crate) fn value<const P: u64>(&self, point: &FieldPoint<FieldElement<P>>) -> Option<FieldElement<P>> {
         let denominator = polynomial_value(&self.denominator, point)?.inverse()?;
         Some(polynomial_value(&self.numerator, point)? * denominator)
     }
@@ -204,9 +176,7 @@ impl RationalFunction {
             let (mut sum, mut size) = (0.0, 0.0);
             for (powers, k) in p {
                 let term = powers.iter().fold(k.to_f64(), |product, (v, n)| {
-                    product
-                        * v.value_f64(constants)
-                            .powi(i32::try_from(*n).unwrap_or(i32::MAX))
+                    product * v.value_f64(constants).powi(i32::try_from(*n).unwrap_or(i32::MAX))
                 });
                 sum += term;
                 size += term.abs();
@@ -223,8 +193,7 @@ impl RationalFunction {
 
     /// Its exact value for exact constants, by index; sines, cosines and roots are those of double precision.
     pub fn value_exact(&self, constants: &[BigRational]) -> BigRational {
-        polynomial_exact(&self.numerator, constants)
-            / polynomial_exact(&self.denominator, constants)
+        polynomial_exact(&self.numerator, constants) / polynomial_exact(&self.denominator, constants)
     }
 
     /// As an expression of the graph.
@@ -236,12 +205,7 @@ impl RationalFunction {
                 .map(|(powers, k)| {
                     let factors: Vec<_> = powers
                         .iter()
-                        .map(|(v, n)| {
-                            (
-                                v.expression(graph),
-                                i32::try_from(*n).expect("a small exponent"),
-                            )
-                        })
+                        .map(|(v, n)| (v.expression(graph), i32::try_from(*n).expect("a small exponent")))
                         .collect();
                     (graph.product(&factors), k.clone())
                 })
@@ -299,10 +263,7 @@ fn with_fewest_terms(mut p: TrigonometricPolynomial) -> TrigonometricPolynomial 
                 let found = powers.iter().find(|(w, _)| *w == v);
                 found.map_or(0, |(_, n)| *n)
             };
-            let (cosines, sines) = (
-                power_of(FactorVariable::Cos(i)),
-                power_of(FactorVariable::Sin(i)),
-            );
+            let (cosines, sines) = (power_of(FactorVariable::Cos(i)), power_of(FactorVariable::Sin(i)));
             // cos^2n = (1 - sin^2)^n, term by term with alternating binomial coefficients.
             let n = cosines / 2;
             let mut coefficient = k.clone();
@@ -330,11 +291,9 @@ pub(crate) fn monomial_value<const P: u64>(
     powers: &PowerProduct,
     point: &FieldPoint<FieldElement<P>>,
 ) -> Option<FieldElement<P>> {
-    powers
-        .iter()
-        .try_fold(FieldElement::ONE, |product, (v, n)| {
-            Some(product * v.value(point)?.power(u64::from(*n)))
-        })
+    powers.iter().try_fold(FieldElement::ONE, |product, (v, n)| {
+        Some(product * v.value(point)?.power(u64::from(*n)))
+    })
 }
 
 /// The value of a polynomial at a point of the field; `None` if a root does not exist there.

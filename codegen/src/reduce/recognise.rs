@@ -8,9 +8,7 @@ use modelmill_spec::Mechanism;
 use num_traits::ToPrimitive;
 
 use super::base;
-use super::rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
-};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::Rational;
 use crate::tree::expressions::ParameterMonomial;
 
@@ -69,26 +67,23 @@ impl<'a> FileConstants<'a> {
         };
         let mut powers = vec![one];
         // Only lengths and pure numbers are used; angles occur in factors only through sines and cosines.
-        let lengths: Vec<(FactorVariable, BigFloat, i32)> =
-            (mechanism.constants.iter().enumerate())
-                .filter(|(_, c)| !c.is_angle && c.value != 0.0)
-                .filter_map(|(i, c)| {
-                    let metres = match c.unit.as_str() {
-                        "m" => 1,
-                        "1" => 0,
-                        _ => return None,
-                    };
-                    Some((
-                        FactorVariable::Constant(i),
-                        BigFloat::from_shortest_decimal(c.value)?,
-                        metres,
-                    ))
-                })
-                .collect();
+        let lengths: Vec<(FactorVariable, BigFloat, i32)> = (mechanism.constants.iter().enumerate())
+            .filter(|(_, c)| !c.is_angle && c.value != 0.0)
+            .filter_map(|(i, c)| {
+                let metres = match c.unit.as_str() {
+                    "m" => 1,
+                    "1" => 0,
+                    _ => return None,
+                };
+                Some((
+                    FactorVariable::Constant(i),
+                    BigFloat::from_shortest_decimal(c.value)?,
+                    metres,
+                ))
+            })
+            .collect();
         let mut push = |above: &[usize], below: &[usize]| {
-            let of = |chosen: &[usize]| -> Vec<FactorVariable> {
-                chosen.iter().map(|i| lengths[*i].0).collect()
-            };
+            let of = |chosen: &[usize]| -> Vec<FactorVariable> { chosen.iter().map(|i| lengths[*i].0).collect() };
             let product = |chosen: &[usize]| {
                 chosen
                     .iter()
@@ -109,11 +104,7 @@ impl<'a> FileConstants<'a> {
             push(&[], &[i]);
         }
         // There are so many products that with few digits some would equal any number by chance.
-        let together = if rounding <= TOGETHER {
-            lengths.len()
-        } else {
-            0
-        };
+        let together = if rounding <= TOGETHER { lengths.len() } else { 0 };
         for i in 0..together {
             for j in (0..lengths.len()).filter(|_| lengths.len() <= MOST_IN_PAIRS) {
                 if i <= j {
@@ -144,8 +135,7 @@ impl<'a> FileConstants<'a> {
         product: &ParameterMonomial,
         kept: &ParameterMonomial,
     ) -> RationalFunction {
-        let [of_product, of_kept] =
-            [product, kept].map(|of| base::product_unit(self.mechanism, of));
+        let [of_product, of_kept] = [product, kept].map(|of| base::product_unit(self.mechanism, of));
         // The column of a product has its inverse unit.
         let wanted = if of_product == of_kept {
             Some(0)
@@ -180,10 +170,7 @@ impl<'a> FileConstants<'a> {
         (1..=LARGEST_DENOMINATOR).find_map(|below| {
             let wanted = ratio * below as f64;
             let above = wanted.round();
-            if above == 0.0
-                || above.abs() > LARGEST_NUMERATOR
-                || (above - wanted).abs() > ROUGH * wanted.abs()
-            {
+            if above == 0.0 || above.abs() > LARGEST_NUMERATOR || (above - wanted).abs() > ROUGH * wanted.abs() {
                 return None;
             }
             let number = Rational::new(above.to_i64()?, below);

@@ -96,21 +96,12 @@ impl<O: PrimeFieldOracle> DependenceSurvey<O> {
         let indices: Vec<usize> = wanted.iter().map(|(k, _)| *k).collect();
         // Degrees in single constants, then in all lengths together, then coefficients.
         for group in independent_groups(&self.moved, &indices, shapes) {
-            probe_degrees(
-                oracle,
-                origin,
-                &self.at_origin,
-                &group,
-                &indices,
-                shapes,
-                stream,
-            )?;
+            probe_degrees(oracle, origin, &self.at_origin, &group, &indices, shapes, stream)?;
         }
         total_degrees(oracle, origin, &self.constants, &indices, shapes, stream)?;
         let mut found = Vec::with_capacity(wanted.len());
         for (k, is_needed) in wanted {
-            let function =
-                shapes[*k].fit_function(&mut self.fields, oracle, *k, &self.roots, stream)?;
+            let function = shapes[*k].fit_function(&mut self.fields, oracle, *k, &self.roots, stream)?;
             // Other functions are not used without a needed one, so no work is spent on them.
             let resists = function.is_none();
             found.push(function);
@@ -158,11 +149,7 @@ fn vary_constants<O: PrimeFieldOracle>(
             }
         }
         if has_effect {
-            all.push(VariedConstant {
-                constant,
-                at,
-                values,
-            });
+            all.push(VariedConstant { constant, at, values });
         }
     }
     Ok(all)
@@ -345,14 +332,7 @@ fn total_degrees<O: PrimeFieldOracle>(
     let mut open: Vec<usize> = functions
         .iter()
         .copied()
-        .filter(|k| {
-            shapes[*k]
-                .degrees
-                .keys()
-                .filter(|(_, in_angle)| !in_angle)
-                .count()
-                > 1
-        })
+        .filter(|k| shapes[*k].degrees.keys().filter(|(_, in_angle)| !in_angle).count() > 1)
         .collect();
     while !open.is_empty() && x.len() < MOST_POINTS {
         // All lengths move along a line at once; angles stay at the origin.
@@ -390,10 +370,7 @@ fn set_constant(point: &mut FieldPoint, (index, in_angle): ConstantOccurrence, t
 }
 
 /// The value of a constant; in sines and cosines the tangent of half its angle.
-fn constant_value(
-    point: &FieldPoint,
-    (index, in_angle): ConstantOccurrence,
-) -> Option<FieldElement> {
+fn constant_value(point: &FieldPoint, (index, in_angle): ConstantOccurrence) -> Option<FieldElement> {
     let atom = Atom::Constant(index);
     if !in_angle {
         return point.values.get(&atom).copied();

@@ -52,13 +52,11 @@ impl ReductionMethod {
     /// The limitation of the reduction as a sentence for the reader; `None` if it is valid for general values.
     pub fn caution(&self) -> Option<String> {
         match self {
-            Self::Exact {
-                at_values: false, ..
-            }
-            | Self::Unreduced => None,
+            Self::Exact { at_values: false, .. } | Self::Unreduced => None,
             Self::Exact { .. } => Some(
                 "the constants are replaced by the values of this file: base and equations are valid for these values \
-                 only".to_owned(),
+                 only"
+                    .to_owned(),
             ),
             Self::Numeric { because, residual, .. } => Some(format!(
                 "the base parameters were computed numerically from the values of this file: {because}; factors are \
@@ -83,10 +81,7 @@ pub struct ColumnDependency {
 impl BaseReduction {
     /// The factors of every dependent product on retained ones alone, by position in [`BaseReduction::retained`];
     /// `None` if `value` returns `None` for a factor.
-    pub fn factors_by<T>(
-        &self,
-        value: &dyn Fn(&RationalFunction) -> Option<T>,
-    ) -> Option<Vec<BTreeMap<usize, T>>>
+    pub fn factors_by<T>(&self, value: &dyn Fn(&RationalFunction) -> Option<T>) -> Option<Vec<BTreeMap<usize, T>>>
     where
         T: Clone + Add<Output = T> + Mul<Output = T>,
     {
@@ -125,10 +120,7 @@ impl BaseReduction {
 
     /// Index in `dependencies` of a dependent product.
     pub(crate) fn line_of(&self, product: usize) -> usize {
-        let line = self
-            .dependencies
-            .iter()
-            .position(|line| line.product == product);
+        let line = self.dependencies.iter().position(|line| line.product == product);
         line.expect("what a product goes by is dependent")
     }
 
@@ -141,9 +133,7 @@ impl BaseReduction {
             let mut open = vec![start];
             while let Some(i) = open.last().copied() {
                 let via = self.dependencies[i].via.iter();
-                let next = via
-                    .map(|(product, _)| self.line_of(*product))
-                    .find(|l| !is_done[*l]);
+                let next = via.map(|(product, _)| self.line_of(*product)).find(|l| !is_done[*l]);
                 match next {
                     Some(next) => open.push(next),
                     None => {

@@ -16,9 +16,7 @@ use std::collections::BTreeMap;
 use modelmill_algebra::eliminate::{self, RowEchelonForm};
 use modelmill_algebra::field::FieldElement;
 
-use super::rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
-};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::DeriveError;
 use crate::expr::{FieldPoint, Rational};
 
@@ -53,10 +51,7 @@ impl ColumnRelation {
     ///
     /// # Errors
     /// [`DeriveError::RankChanged`] if the columns have other dependences at these constants.
-    fn values<const P: u64>(
-        &self,
-        echelon: &RowEchelonForm<P>,
-    ) -> Result<Vec<FieldElement<P>>, DeriveError> {
+    fn values<const P: u64>(&self, echelon: &RowEchelonForm<P>) -> Result<Vec<FieldElement<P>>, DeriveError> {
         let entry = |p: usize, k: usize| echelon.entry(p, k).ok_or(DeriveError::RankChanged);
         let mut of_dependent = Vec::new();
         if !self.dependent.is_empty() {
@@ -119,10 +114,7 @@ pub(super) fn find_relations<const P: u64>(
         direct.sort_unstable();
         let near = needed_columns(echelon, &order[..at], *column);
         let is_shorter = near.len() < direct.len();
-        for columns in [Some(direct), is_shorter.then_some(near)]
-            .into_iter()
-            .flatten()
-        {
+        for columns in [Some(direct), is_shorter.then_some(near)].into_iter().flatten() {
             let (dependent, retained) = columns.into_iter().partition(|k| dependent.contains(k));
             found.push(ColumnRelation {
                 column: *column,
@@ -135,11 +127,7 @@ pub(super) fn find_relations<const P: u64>(
 }
 
 /// The columns among those before `column` that express it if the last ones are preferred.
-fn needed_columns<const P: u64>(
-    echelon: &RowEchelonForm<P>,
-    before: &[usize],
-    column: usize,
-) -> Vec<usize> {
+fn needed_columns<const P: u64>(echelon: &RowEchelonForm<P>, before: &[usize], column: usize) -> Vec<usize> {
     /// A column as a vector over the retained ones, with the combination of columns that it equals.
     struct ColumnCombination<const P: u64> {
         /// Position of its first entry that is not zero, which is 1.
@@ -156,9 +144,7 @@ fn needed_columns<const P: u64>(
         entries.map(Option::unwrap_or_default).collect()
     };
     // Eliminates the known pivots from a vector, and applies the same steps to its combination.
-    let reduced = |known: &[ColumnCombination<P>],
-                   target: &mut Vec<FieldElement<P>>,
-                   of: &mut BTreeMap<_, _>| {
+    let reduced = |known: &[ColumnCombination<P>], target: &mut Vec<FieldElement<P>>, of: &mut BTreeMap<_, _>| {
         for one in known {
             let factor = -target[one.pivot];
             if factor == FieldElement::ZERO {
@@ -288,10 +274,7 @@ type RelationFactors = Vec<Option<RationalFunction>>;
 
 impl SolvedRelations {
     /// Assigns factors, in the order of [`values`], to the relations.
-    pub(super) fn new<'a>(
-        relations: impl Iterator<Item = &'a ColumnRelation>,
-        factors: RelationFactors,
-    ) -> Self {
+    pub(super) fn new<'a>(relations: impl Iterator<Item = &'a ColumnRelation>, factors: RelationFactors) -> Self {
         let mut rest = factors.into_iter();
         let own = |relation: &ColumnRelation| {
             let factors = relation.columns().map(|_| rest.next().flatten());
@@ -303,30 +286,21 @@ impl SolvedRelations {
     /// Dependent columns whose relations to other dependent columns are unknown, or have denominators other than
     /// lengths.
     pub(super) fn unwieldy_columns(&self) -> Vec<usize> {
-        let is_simple = |f: &Option<RationalFunction>| {
-            f.as_ref()
-                .and_then(MonomialQuotient::from_function)
-                .is_some()
-        };
+        let is_simple = |f: &Option<RationalFunction>| f.as_ref().and_then(MonomialQuotient::from_function).is_some();
         let lines = self.0.iter();
-        let unwieldy =
-            lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_simple));
+        let unwieldy = lines.filter(|(r, factors)| !r.has_retained_only() && !factors.iter().all(is_simple));
         unwieldy.map(|(relation, _)| relation.column).collect()
     }
 
     /// Whether a factor on retained columns could not be reconstructed, so that the others are of no use.
     pub(super) fn has_unknown_factor(&self) -> bool {
-        let mut direct = self
-            .0
-            .iter()
-            .filter(|(relation, _)| relation.has_retained_only());
+        let mut direct = self.0.iter().filter(|(relation, _)| relation.has_retained_only());
         direct.any(|(_, factors)| factors.iter().any(Option::is_none))
     }
 
     /// Replaces relations by others of the same columns, as far as these are completely known.
     pub(super) fn replace(&mut self, others: Self) {
-        let known =
-            |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
+        let known = |(_, factors): &(ColumnRelation, RelationFactors)| factors.iter().all(Option::is_some);
         for other in others.0.into_iter().filter(known) {
             if let Some(line) = self.0.iter_mut().find(|(r, _)| r.column == other.0.column) {
                 *line = other;
@@ -336,11 +310,7 @@ impl SolvedRelations {
 
     /// The wanted factors, each multiplied out if all denominators are products of lengths and all roots are
     /// independent. Other factors are `None`, because their lowest terms cannot be determined from their parts.
-    pub(super) fn expanded_factors(
-        &self,
-        wanted: &[(usize, usize)],
-        roots: &[i64],
-    ) -> Vec<Option<RationalFunction>> {
+    pub(super) fn expanded_factors(&self, wanted: &[(usize, usize)], roots: &[i64]) -> Vec<Option<RationalFunction>> {
         // Columns in order, so that the factors of dependent columns in a relation are already expanded.
         let mut expanded: BTreeMap<usize, RetainedFactors> = BTreeMap::new();
         for (relation, factors) in &self.0 {
@@ -444,8 +414,7 @@ impl RetainedFactors {
     /// The factors of a relation that contains retained columns only.
     fn from_relation(relation: &ColumnRelation, factors: &[Option<RationalFunction>]) -> Self {
         let pairs = relation.retained.iter().zip(factors);
-        let quotients =
-            (pairs.clone()).map(|(p, f)| Some((*p, MonomialQuotient::from_function(f.as_ref()?)?)));
+        let quotients = (pairs.clone()).map(|(p, f)| Some((*p, MonomialQuotient::from_function(f.as_ref()?)?)));
         Self {
             quotients: quotients.collect(),
             functions: pairs.filter_map(|(p, f)| Some((*p, f.clone()?))).collect(),
@@ -546,8 +515,7 @@ impl MonomialQuotient {
 
     /// Converts to a general rational function in lowest terms.
     fn to_function(&self) -> RationalFunction {
-        let denominator =
-            TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
+        let denominator = TrigonometricPolynomial::from([(self.denominator.clone(), Rational::ONE)]);
         RationalFunction::new(self.numerator.clone(), denominator)
     }
 }
@@ -568,11 +536,7 @@ fn quotient(a: &PowerProduct, b: &PowerProduct) -> PowerProduct {
 }
 
 /// Combines the exponents of two sorted products of powers, variable by variable; zero exponents are dropped.
-fn merge_powers(
-    a: &PowerProduct,
-    b: &PowerProduct,
-    exponent: impl Fn(u32, u32) -> u32,
-) -> PowerProduct {
+fn merge_powers(a: &PowerProduct, b: &PowerProduct, exponent: impl Fn(u32, u32) -> u32) -> PowerProduct {
     let mut found = PowerProduct::with_capacity(a.len() + b.len());
     let (mut a, mut b) = (a.iter().peekable(), b.iter().peekable());
     loop {

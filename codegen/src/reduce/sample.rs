@@ -56,21 +56,9 @@ impl MotionSampler {
         projection: &LoopProjection,
         outputs: &[ExprId],
     ) -> Result<Self, DeriveError> {
-        let loops = || {
-            projection
-                .loops
-                .closures
-                .iter()
-                .map(|c| c.name.clone())
-                .collect()
-        };
-        let plan = plan(
-            graph,
-            mechanism,
-            &projection.loops,
-            SolvableCoordinates::Any,
-        )
-        .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
+        let loops = || projection.loops.closures.iter().map(|c| c.name.clone()).collect();
+        let plan = plan(graph, mechanism, &projection.loops, SolvableCoordinates::Any)
+            .ok_or_else(|| DeriveError::LoopsNotSampled { loops: loops() })?;
         // Passive rates and accelerations are needed at every point, so their roots must exist too.
         let mut all = outputs.to_vec();
         all.extend(&projection.passive_rates);
@@ -126,10 +114,7 @@ impl MotionSampler {
         let parts: [fn(&ExtensionElement<P>) -> FieldElement<P>; 2] = [|x| x.re, |x| x.im];
         let is_split = values.iter().any(|x| x.im != FieldElement::ZERO);
         let shown = &parts[..=usize::from(is_split)];
-        Ok(shown
-            .iter()
-            .flat_map(|part| values.iter().map(part))
-            .collect())
+        Ok(shown.iter().flat_map(|part| values.iter().map(part)).collect())
     }
 
     /// Values of the outputs at one draw; `None` if a root or a quotient does not exist there.
@@ -153,11 +138,7 @@ impl MotionSampler {
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.values.insert(Atom::Rate(*p), value);
         }
-        for (p, value) in self
-            .passive
-            .iter()
-            .zip(self.accelerations.evaluate(&point)?)
-        {
+        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
             point.values.insert(Atom::Acceleration(*p), value);
         }
         self.outputs.evaluate(&point)

@@ -60,14 +60,11 @@ impl<'a> WalkSampler<'a> {
         let loops = &projection.loops;
         let walk = PoseWalk::new(graph, mechanism, loops).ok_or(none.clone())?;
         let n_drives = projection.drives.len();
-        let outputs: Vec<ExprId> = (0..n_drives)
-            .flat_map(|d| columns.iter().map(move |c| c[d]))
-            .collect();
+        let outputs: Vec<ExprId> = (0..n_drives).flat_map(|d| columns.iter().map(move |c| c[d])).collect();
         // Values of the file as the decimals that were written, not as binary numbers.
         let mut constants = BigFloatPoint::default();
-        let mut set = |atom, value: Option<BigFloat>, is_angle| {
-            value.and_then(|value| constants.set(atom, value, is_angle))
-        };
+        let mut set =
+            |atom, value: Option<BigFloat>, is_angle| value.and_then(|value| constants.set(atom, value, is_angle));
         set(Atom::Pi, Some(BigFloat::pi()), false).ok_or(none.clone())?;
         for (i, constant) in mechanism.constants.iter().enumerate() {
             let value = if constant.is_angle {
@@ -87,10 +84,7 @@ impl<'a> WalkSampler<'a> {
             passive: loops.passive.clone(),
             n_columns: columns.len(),
             n_drives,
-            residual: EvaluationTape::new(
-                graph,
-                &[loops.residual.clone(), all_residuals(loops)].concat(),
-            ),
+            residual: EvaluationTape::new(graph, &[loops.residual.clone(), all_residuals(loops)].concat()),
             rates: EvaluationTape::new(graph, &projection.passive_rates),
             accelerations: EvaluationTape::new(graph, &projection.passive_accelerations),
             outputs: EvaluationTape::new(graph, &outputs),
@@ -132,21 +126,11 @@ impl<'a> WalkSampler<'a> {
                 continue;
             }
             n_found += 1;
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "the exponent of a machine number"
-            )]
+            #[expect(clippy::cast_possible_truncation, reason = "the exponent of a machine number")]
             // Scaling by a power of two is exact.
             let scale = -(largest.log2() as i64);
-            let scaled: Vec<BigFloat> = values
-                .iter()
-                .map(|x| x.scale_by_power_of_two(scale))
-                .collect();
-            rows.extend(
-                scaled
-                    .chunks(self.n_columns.max(1))
-                    .map(<[BigFloat]>::to_vec),
-            );
+            let scaled: Vec<BigFloat> = values.iter().map(|x| x.scale_by_power_of_two(scale)).collect();
+            rows.extend(scaled.chunks(self.n_columns.max(1)).map(<[BigFloat]>::to_vec));
         }
         Ok(rows)
     }
@@ -167,8 +151,7 @@ impl<'a> WalkSampler<'a> {
         let (mut point, off) = self.close_loops(q)?;
         for i in self.active.clone() {
             let unit = self.walk.coordinate_unit(i);
-            let mut random =
-                |most: f64| BigFloat::from_f64(most * unit * uniform_symmetric(&mut self.stream));
+            let mut random = |most: f64| BigFloat::from_f64(most * unit * uniform_symmetric(&mut self.stream));
             point.set(Atom::Rate(i), random(2.0)?, false)?;
             point.set(Atom::Acceleration(i), random(5.0)?, false)?;
         }
@@ -181,11 +164,7 @@ impl<'a> WalkSampler<'a> {
         for (p, value) in self.passive.iter().zip(self.rates.evaluate(&point)?) {
             point.set(Atom::Rate(*p), value, false)?;
         }
-        for (p, value) in self
-            .passive
-            .iter()
-            .zip(self.accelerations.evaluate(&point)?)
-        {
+        for (p, value) in self.passive.iter().zip(self.accelerations.evaluate(&point)?) {
             point.set(Atom::Acceleration(*p), value, false)?;
         }
         let values = self.outputs.evaluate(&point)?;
@@ -243,8 +222,7 @@ fn declared_angle(value: f64) -> Option<BigFloat> {
     // Quarters of a degree in half a revolution.
     const PER_HALF_TURN: f64 = 720.0;
     let n = (value / std::f64::consts::PI * PER_HALF_TURN).round();
-    let is_near = (n * std::f64::consts::PI / PER_HALF_TURN - value).abs()
-        <= 4.0 * f64::EPSILON * value.abs();
+    let is_near = (n * std::f64::consts::PI / PER_HALF_TURN - value).abs() <= 4.0 * f64::EPSILON * value.abs();
     if is_near && n != 0.0 {
         let part = &BigFloat::from_f64(n)? * &BigFloat::pi();
         return Some(part / BigFloat::from_f64(PER_HALF_TURN)?);

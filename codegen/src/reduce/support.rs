@@ -73,8 +73,7 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
     /// Number of equations in addition to the unknowns: they confirm the ansatz.
     const MORE: usize = 4;
     // With no variable varied, the only monomial is 1.
-    let mut kept: [BTreeSet<PowerProduct>; 2] =
-        [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
+    let mut kept: [BTreeSet<PowerProduct>; 2] = [0, 1].map(|_| BTreeSet::from([PowerProduct::new()]));
     for n in 1..=variables.len() {
         let loose = &variables[..n];
         oracle.charge((numerator.len() + denominator.len()) * 100)?;
@@ -109,17 +108,13 @@ pub(super) fn nonzero_monomials<O: PrimeFieldOracle>(
             return Ok(None);
         };
         // Monomials with a coefficient remain for the next stage.
-        let with_coefficient =
-            |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
-                let pairs = monomials.iter().zip(factors);
-                let with_coefficient = pairs.filter(|(_, x)| **x != FieldElement::ZERO);
-                with_coefficient.map(|(m, _)| m.clone()).collect()
-            };
+        let with_coefficient = |monomials: &[PowerProduct], factors: &[FieldElement]| -> BTreeSet<PowerProduct> {
+            let pairs = monomials.iter().zip(factors);
+            let with_coefficient = pairs.filter(|(_, x)| **x != FieldElement::ZERO);
+            with_coefficient.map(|(m, _)| m.clone()).collect()
+        };
         let (above, below) = solution.split_at(top.len());
-        kept = [
-            with_coefficient(&top, above),
-            with_coefficient(&bottom, below),
-        ];
+        kept = [with_coefficient(&top, above), with_coefficient(&bottom, below)];
     }
     Ok(Some(kept.map(|set| set.into_iter().collect())))
 }

@@ -6,8 +6,8 @@ use crate::expr::vector::{self, AxisRotation};
 use crate::expr::{ExprId, Graph};
 use crate::newton_euler::inertia::InertiaByProduct;
 use crate::newton_euler::{
-    self, BodyInertia, CarryDepths, InertiaDiagonal, InertiaElement, InertiaFactors, JointSide,
-    RecursionStyle, SymbolicWrench, TreeMotion,
+    self, BodyInertia, CarryDepths, InertiaDiagonal, InertiaElement, InertiaFactors, JointSide, RecursionStyle,
+    SymbolicWrench, TreeMotion,
 };
 use crate::tree::KinematicTree;
 use crate::tree::expressions::ParameterMonomial;
@@ -31,10 +31,7 @@ impl ColumnForm {
     /// The textbook form: each column by itself, link by link.
     pub(crate) const PLAIN: Self = Self {
         style: RecursionStyle::PLAIN,
-        depths: CarryDepths {
-            moments: 0,
-            forces: 0,
-        },
+        depths: CarryDepths { moments: 0, forces: 0 },
         axial: false,
         fixed_axes: false,
     };
@@ -174,20 +171,11 @@ impl RecursionFrames {
         };
         // Velocities and accelerations from the base to the ends.
         let motion = newton_euler::forward_recursion(graph, &tree, gravity, style);
-        Self {
-            tree,
-            turns,
-            motion,
-        }
+        Self { tree, turns, motion }
     }
 
     /// An inertia of a link in the axes of its frame.
-    pub(crate) fn rotate_body(
-        &self,
-        graph: &mut Graph,
-        link: usize,
-        body: &BodyInertia,
-    ) -> BodyInertia {
+    pub(crate) fn rotate_body(&self, graph: &mut Graph, link: usize, body: &BodyInertia) -> BodyInertia {
         match self.turns.get(link) {
             Some(turn) => body.rotate(graph, turn),
             None => *body,
@@ -217,15 +205,10 @@ fn single_moment(inertia: &InertiaFactors) -> Option<usize> {
 }
 
 /// Whether one of the products is the moment of inertia of a link about the axis of its joint.
-fn has_axial_column(
-    inertia: &InertiaByProduct,
-    link: usize,
-    products: &[ParameterMonomial],
-) -> bool {
+fn has_axial_column(inertia: &InertiaByProduct, link: usize, products: &[ParameterMonomial]) -> bool {
     products.iter().any(|product| {
         let mut bodies = inertia.link_inertias(product);
         let only = bodies.next();
-        only.is_some_and(|(l, inertia)| l == link && single_moment(inertia) == Some(2))
-            && bodies.next().is_none()
+        only.is_some_and(|(l, inertia)| l == link && single_moment(inertia) == Some(2)) && bodies.next().is_none()
     })
 }

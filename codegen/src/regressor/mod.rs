@@ -7,9 +7,7 @@ pub(crate) mod projection;
 
 use std::collections::BTreeSet;
 
-use modelmill_spec::{
-    CoordinateIdx, DriveKind, EffectPlace, EffectTerm, Mechanism, ModelEffect, PlaceQuantity,
-};
+use modelmill_spec::{CoordinateIdx, DriveKind, EffectPlace, EffectTerm, Mechanism, ModelEffect, PlaceQuantity};
 
 use crate::DeriveError;
 use crate::expr::{Atom, ExprId, Graph};
@@ -47,10 +45,7 @@ pub(crate) struct EffectForces {
 }
 
 /// Derives the regressor H for all products of parameters.
-pub(crate) fn unreduced_equations(
-    graph: &mut Graph,
-    mechanism: &Mechanism,
-) -> Result<UnreducedEquations, DeriveError> {
+pub(crate) fn unreduced_equations(graph: &mut Graph, mechanism: &Mechanism) -> Result<UnreducedEquations, DeriveError> {
     // Kinematics and inertia of the open tree, then loops and drives.
     let tree = KinematicTree::new(graph, mechanism)?;
     let gravity = [
@@ -119,14 +114,9 @@ impl UnreducedEquations {
             .map(|product| {
                 // Wrenches of the links, carried to the joints.
                 let wrenches = form.wrenches(graph, &self.inertia, frames, product, products);
-                let on_tree =
-                    newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
+                let on_tree = newton_euler::carry_wrench(graph, tree, style, n, form.depths, wrenches);
                 let value = |m: &ParameterMonomial| {
-                    if m == product {
-                        Graph::ONE
-                    } else {
-                        Graph::ZERO
-                    }
+                    if m == product { Graph::ONE } else { Graph::ZERO }
                 };
                 self.drive_forces(graph, mechanism, &on_tree, &value)
             })
@@ -144,8 +134,7 @@ impl UnreducedEquations {
     ) -> Result<Vec<ExprId>, DeriveError> {
         let wrenches = form.wrenches(graph, &self.inertia, &self.tree, frames, value);
         let n = mechanism.coordinates.len();
-        let on_tree =
-            newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
+        let on_tree = newton_euler::backward_recursion(graph, &frames.tree, form.style, n, wrenches);
         self.drive_forces(graph, mechanism, &on_tree, value)
     }
 
@@ -174,12 +163,7 @@ impl UnreducedEquations {
     }
 
     /// Generalised forces on the independent coordinates, from those of the open tree and from forces along the drives.
-    pub(crate) fn project_on_active(
-        &self,
-        graph: &mut Graph,
-        on_tree: &[ExprId],
-        on_drives: &[ExprId],
-    ) -> Vec<ExprId> {
+    pub(crate) fn project_on_active(&self, graph: &mut Graph, on_tree: &[ExprId], on_drives: &[ExprId]) -> Vec<ExprId> {
         // Forces along drives act through the Jacobian.
         let projected = self.projection.project(graph, on_tree);
         projected
@@ -232,10 +216,9 @@ impl UnreducedEquations {
                         EffectPlace::Coordinate(i) => &mut on_tree[i.0],
                         EffectPlace::Drive(d) => &mut on_drives[d.0],
                         // Masses are in the inertia, and the rest has no parameters.
-                        EffectPlace::Point(_)
-                        | EffectPlace::Part(_)
-                        | EffectPlace::Base
-                        | EffectPlace::Force => continue,
+                        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
+                            continue;
+                        }
                     };
                     let factor = self.effect_factor(graph, mechanism, effect, p, term)?;
                     let force = graph.mul(factor, value);
@@ -300,18 +283,11 @@ impl UnreducedEquations {
                 ]
             }
             EffectPlace::Coordinate(i) => {
-                let atoms = [
-                    Atom::Coordinate(i.0),
-                    Atom::Rate(i.0),
-                    Atom::Acceleration(i.0),
-                ];
+                let atoms = [Atom::Coordinate(i.0), Atom::Rate(i.0), Atom::Acceleration(i.0)];
                 let [q, qd, qdd] = atoms.map(|a| Some(graph.atom(a)));
                 [q, qd, qdd, None]
             }
-            EffectPlace::Point(_)
-            | EffectPlace::Part(_)
-            | EffectPlace::Base
-            | EffectPlace::Force => [None; 4],
+            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => [None; 4],
         }
     }
 }

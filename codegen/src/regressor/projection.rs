@@ -16,7 +16,7 @@ use crate::DeriveError;
 use crate::expr::linear::{self, LinearSolution};
 use crate::expr::{Atom, ExprId, Graph, Node, Rational, Unary, nominal_value};
 use crate::loops::KinematicLoops;
-use crate::loops::stretch::distance_squared;
+use crate::loops::segment::distance_squared;
 use crate::tree::KinematicTree;
 
 /// Kinematics of one drive.
@@ -57,11 +57,7 @@ pub(crate) struct LoopProjection {
 
 impl LoopProjection {
     /// Solves the differentiated loops for the passive motion and adds the drives.
-    pub(crate) fn new(
-        graph: &mut Graph,
-        mechanism: &Mechanism,
-        tree: &KinematicTree,
-    ) -> Result<Self, DeriveError> {
+    pub(crate) fn new(graph: &mut Graph, mechanism: &Mechanism, tree: &KinematicTree) -> Result<Self, DeriveError> {
         let n = mechanism.coordinates.len();
         // Derivatives of the residuals by all coordinates.
         let loops = KinematicLoops::new(graph, mechanism, tree)?;
@@ -81,12 +77,7 @@ impl LoopProjection {
         // Columns of the Jacobian in the rates `y`.
         let pick = |graph: &mut Graph, columns: &[usize]| -> Vec<Vec<ExprId>> {
             (0..residual.len())
-                .map(|r| {
-                    columns
-                        .iter()
-                        .map(|j| in_y(graph, &by_coordinate, r, *j))
-                        .collect()
-                })
+                .map(|r| columns.iter().map(|j| in_y(graph, &by_coordinate, r, *j)).collect())
                 .collect()
         };
         let (loop_p, loop_a) = (pick(graph, passive), pick(graph, active));
@@ -103,11 +94,7 @@ impl LoopProjection {
             .collect();
         let solution = linear::solve(graph, &loop_p, &rhs, "the passive rates")?;
         // The solution: passive rates per active rate, and the drift of the accelerations.
-        let transmission: Vec<Vec<ExprId>> = solution
-            .values
-            .iter()
-            .map(|row| row[..active.len()].to_vec())
-            .collect();
+        let transmission: Vec<Vec<ExprId>> = solution.values.iter().map(|row| row[..active.len()].to_vec()).collect();
         let residual_jacobian = (0..residual.len())
             .map(|r| passive.iter().map(|p| by_coordinate[*p][r]).collect())
             .collect();
@@ -135,8 +122,7 @@ impl LoopProjection {
             .iter()
             .map(|row| row.last().copied().unwrap_or(Graph::ZERO))
             .collect();
-        projection.passive_accelerations =
-            projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
+        projection.passive_accelerations = projection.passive_motion(graph, Atom::Acceleration, Some(&drift));
         projection.add_drives(graph, mechanism, tree)?;
         Ok(projection)
     }
@@ -154,12 +140,7 @@ impl LoopProjection {
 
     /// Rates or accelerations of the passive coordinates from those of the active ones; `drift` is added to
     /// accelerations.
-    fn passive_motion(
-        &self,
-        graph: &mut Graph,
-        order: fn(usize) -> Atom,
-        drift: Option<&[ExprId]>,
-    ) -> Vec<ExprId> {
+    fn passive_motion(&self, graph: &mut Graph, order: fn(usize) -> Atom, drift: Option<&[ExprId]>) -> Vec<ExprId> {
         let n = self.rates_of.len();
         // Active rates are inputs, passive ones follow by the transmission.
         let mut y = vec![Graph::ZERO; n];
@@ -218,11 +199,7 @@ impl LoopProjection {
     }
 
     /// Forces of the drives that balance generalised forces of all coordinates of the open tree.
-    pub(crate) fn drive_forces(
-        &self,
-        graph: &mut Graph,
-        forces: &[ExprId],
-    ) -> Result<Vec<ExprId>, DeriveError> {
+    pub(crate) fn drive_forces(&self, graph: &mut Graph, forces: &[ExprId]) -> Result<Vec<ExprId>, DeriveError> {
         // Generalised forces on the active coordinates, which the drives have to balance.
         let projected = self.project(graph, forces);
         let n_drives = self.drive_jacobian.len();
@@ -278,9 +255,7 @@ impl LoopProjection {
             })
             .collect();
         let what = "the forces of the loops";
-        let transposed: Vec<Vec<ExprId>> = (0..n)
-            .map(|p| jacobian.iter().map(|row| row[p]).collect())
-            .collect();
+        let transposed: Vec<Vec<ExprId>> = (0..n).map(|p| jacobian.iter().map(|row| row[p]).collect()).collect();
         // The transposed system is solved directly if it is small enough.
         let rhs: Vec<Vec<ExprId>> = in_y.iter().map(|x| vec![*x]).collect();
         match linear::solve(graph, &transposed, &rhs, what) {
@@ -361,23 +336,14 @@ impl LoopProjection {
         }
         // The system is solved only for its determinants, which must not be zero.
         let identity: Vec<Vec<ExprId>> = (0..n)
-            .map(|i| {
-                (0..n)
-                    .map(|j| if i == j { Graph::ONE } else { Graph::ZERO })
-                    .collect()
-            })
+            .map(|i| (0..n).map(|j| if i == j { Graph::ONE } else { Graph::ZERO }).collect())
             .collect();
         let square: Vec<Vec<ExprId>> = self
             .drive_jacobian
             .iter()
             .map(|row| self.freedoms.iter().map(|a| row[*a]).collect())
             .collect();
-        let solution = linear::solve(
-            graph,
-            &square,
-            &identity,
-            "the inverse of the drives' Jacobian",
-        )?;
+        let solution = linear::solve(graph, &square, &identity, "the inverse of the drives' Jacobian")?;
         self.determinants.extend(solution.determinants);
         Ok(())
     }
@@ -398,9 +364,7 @@ fn signed_length(graph: &mut Graph, mechanism: &Mechanism, length: ExprId) -> Ex
 /// Rates of all coordinates as integer combinations of the rates `y`. For a passive revolute joint `y` is the absolute
 /// rate of its link about the axes that are parallel to its own.
 fn passive_rate_map(tree: &KinematicTree, passive: &[usize], n: usize) -> Vec<Vec<i64>> {
-    let mut rates_of: Vec<Vec<i64>> = (0..n)
-        .map(|i| (0..n).map(|j| i64::from(i == j)).collect())
-        .collect();
+    let mut rates_of: Vec<Vec<i64>> = (0..n).map(|i| (0..n).map(|j| i64::from(i == j)).collect()).collect();
     // Passive coordinates that have been treated; a coordinate may move several links.
     let mut done = Vec::new();
     for link in &tree.links {

@@ -4,16 +4,15 @@
 use modelmill_spec::Mechanism;
 
 use super::document::{
-    self, InlineSpan, PageDocument, PageEquation, PageTable, TextLine, cell, linear_model, name,
-    number, text,
+    self, InlineSpan, PageDocument, PageEquation, PageTable, TextLine, cell, linear_model, name, number, text,
 };
 use super::rank::NumericRank;
 use crate::Derivation;
 use crate::expr::Rational;
 use crate::expr::print::{FormulaSymbol, PrintedFormula};
 use crate::reduce::base::{
-    base_parameter_name as base_name, dependent_sums, expanded_formula, lumped_formulas,
-    product_formula as product, product_unit,
+    base_parameter_name as base_name, dependent_sums, expanded_formula, lumped_formulas, product_formula as product,
+    product_unit,
 };
 use crate::reduce::{RationalFunction, ReductionMethod};
 use crate::tree::expressions::ParameterMonomial;
@@ -26,20 +25,14 @@ pub fn base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
 /// Base parameter `k` with common factors collected: `m1*dc1 + d1*(m2 + m3)`.
 pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFormula {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     // The retained product has the factor 1 and comes first.
-    let mut terms = vec![product(
-        mechanism,
-        &reduction.products[reduction.retained[k]],
-    )];
+    let mut terms = vec![product(mechanism, &reduction.products[reduction.retained[k]])];
     // Lumped products grouped by their common function of the constants: per function pairs of a number and a product.
     let mut groups: Vec<(RationalFunction, Vec<(Rational, PrintedFormula)>)> = Vec::new();
     for (at, line) in reduction.dependencies.iter().enumerate() {
-        let what =
-            PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
+        let what = PrintedFormula::product(Rational::ONE, lumped_formulas(mechanism, reduction, at));
         // The numeric content of a factor is split off, so that factors that differ by a number only share a group.
         for (_, factor) in line.equals.iter().filter(|(at, _)| *at == k) {
             // Equal functions are found by comparison, since there are few.
@@ -55,9 +48,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
     for (function, mut members) in groups {
         let factor = function.formula(mechanism);
         // The greatest common content of the numbers stands in front; the first term in parentheses is positive.
-        let mut number = members
-            .iter()
-            .fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
+        let mut number = members.iter().fold(Rational::ZERO, |c, (k, _)| c.content_with(k));
         if members[0].0.is_negative() {
             number = -&number;
         }
@@ -65,9 +56,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
         for (k, _) in &mut members {
             *k = &*k * &inverse;
         }
-        let sum = members
-            .into_iter()
-            .map(|(k, what)| PrintedFormula::product(k, [what]));
+        let sum = members.into_iter().map(|(k, what)| PrintedFormula::product(k, [what]));
         // number * function * sum
         let term = PrintedFormula::product(number, [factor, PrintedFormula::sum(sum)]);
         terms.push(term);
@@ -81,9 +70,7 @@ pub fn factored_base_expression(derivation: &Derivation, k: usize) -> PrintedFor
 /// whose factors are too long to read.
 pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> PrintedFormula {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     let what = product(mechanism, &reduction.products[product_idx]);
     let mut lines = reduction.dependencies.iter();
@@ -91,9 +78,7 @@ pub fn base_summand(derivation: &Derivation, k: usize, product_idx: usize) -> Pr
     let line = lines.find(|line| line.product == product_idx && line.via.is_empty());
     let factor = line.and_then(|line| line.equals.iter().find(|(at, _)| *at == k));
     match factor {
-        Some((_, factor)) => {
-            PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what])
-        }
+        Some((_, factor)) => PrintedFormula::product(Rational::ONE, [factor.formula(mechanism), what]),
         None => what,
     }
 }
@@ -111,9 +96,7 @@ fn column_symbol(mechanism: &Mechanism, of: &ParameterMonomial) -> PrintedFormul
 /// The section of p_g: a table of the products with unit and nominal value, and a list of products without effect.
 pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     // The model that the table belongs to comes first.
     page.heading("Products of dynamic parameters");
@@ -161,9 +144,7 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
     );
     // Products without effect are listed, so that a reader does not look for them in the table.
     if !reduction.without_effect.is_empty() {
-        let mut line: TextLine = vec![text(
-            "These products do not affect the drives and are left out: ",
-        )];
+        let mut line: TextLine = vec![text("These products do not affect the drives and are left out: ")];
         for (i, m) in reduction.without_effect.iter().enumerate() {
             if i > 0 {
                 line.push(text(", "));
@@ -178,15 +159,12 @@ pub(super) fn products(page: &mut PageDocument, derivation: &Derivation) {
 /// The section of eq. (6): the columns that are combinations of retained ones, and how they were found.
 pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     // Without dependencies one sentence is enough.
     page.heading("Dependent columns");
     if reduction.dependencies.is_empty() {
-        let mut says =
-            "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
+        let mut says = "All columns are linearly independent; nothing needs to be regrouped.".to_owned();
         if let Some(caution) = reduction.method.caution() {
             says = format!("{says} Caution: {caution}.");
         }
@@ -236,15 +214,9 @@ pub(super) fn dependencies(page: &mut PageDocument, derivation: &Derivation) {
 
 /// The section of eq. (16): the base parameters as formulas and their nominal values.
 /// `numeric` is the rank on the file's values, which is compared with the exact one.
-pub(super) fn base_parameters(
-    page: &mut PageDocument,
-    derivation: &Derivation,
-    numeric: Option<&NumericRank>,
-) {
+pub(super) fn base_parameters(page: &mut PageDocument, derivation: &Derivation, numeric: Option<&NumericRank>) {
     let Derivation {
-        mechanism,
-        reduction,
-        ..
+        mechanism, reduction, ..
     } = derivation;
     // A sentence with the rank, then the equations, then the values.
     page.heading("Base parameters");
@@ -277,10 +249,7 @@ pub(super) fn base_parameters(
         left: PrintedFormula::name(base_name(k)),
         right,
         tag: format!("16.{}", k + 1),
-        unit: Some(product_unit(
-            mechanism,
-            &reduction.products[reduction.retained[k]],
-        )),
+        unit: Some(product_unit(mechanism, &reduction.products[reduction.retained[k]])),
     };
     // Long chains have named sums, because base parameters without them would be too long to read.
     let sums = dependent_sums(mechanism, reduction);
@@ -288,15 +257,12 @@ pub(super) fn base_parameters(
         page.paragraph([text(
             "Named sums: a dependent product together with the products that are expressed by it, link by link (Gautier and Khalil 1990):",
         )]);
-        let sums = sums
-            .into_iter()
-            .enumerate()
-            .map(|(i, (name, right))| PageEquation {
-                left: PrintedFormula::name(name),
-                right,
-                tag: format!("7.{}", i + 1),
-                unit: None,
-            });
+        let sums = sums.into_iter().enumerate().map(|(i, (name, right))| PageEquation {
+            left: PrintedFormula::name(name),
+            right,
+            tag: format!("7.{}", i + 1),
+            unit: None,
+        });
         page.equations("sums", sums.collect());
     }
     // Factored forms, which are shorter than the expanded ones that scripts read.
@@ -320,12 +286,7 @@ pub(super) fn base_parameters(
     page.table(
         "values",
         PageTable {
-            head: vec![
-                "base parameter",
-                "retained product",
-                "nominal value",
-                "unit",
-            ],
+            head: vec!["base parameter", "retained product", "nominal value", "unit"],
             rows,
         },
     );

@@ -75,8 +75,7 @@ impl PageDocument {
 
     /// Adds a paragraph of spans.
     pub(super) fn paragraph(&mut self, line: impl IntoIterator<Item = InlineSpan>) {
-        self.blocks
-            .push(PageBlock::Paragraph(line.into_iter().collect()));
+        self.blocks.push(PageBlock::Paragraph(line.into_iter().collect()));
     }
 
     /// Adds a table. A long one is folded under its count and the noun `what`; one without rows is left out.
@@ -98,10 +97,8 @@ impl PageDocument {
             0 => {}
             n if n > LONG => {
                 let summary = format!("{n} {what}");
-                self.blocks.push(PageBlock::Folded(
-                    summary,
-                    vec![PageBlock::Equations(equations)],
-                ));
+                self.blocks
+                    .push(PageBlock::Folded(summary, vec![PageBlock::Equations(equations)]));
             }
             _ => self.blocks.push(PageBlock::Equations(equations)),
         }
@@ -131,11 +128,7 @@ pub(super) fn unit(unit: impl Into<String>) -> InlineSpan {
 /// The spans of `tau = H(q, q', q'') p` with the given names of matrix and parameters.
 pub(super) fn linear_model(matrix: &str, parameters: &str) -> Vec<InlineSpan> {
     // q and its derivatives.
-    let motion = |order| {
-        InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative(
-            "q", order,
-        )))
-    };
+    let motion = |order| InlineSpan::Math(PrintedFormula::Symbol(FormulaSymbol::time_derivative("q", order)));
     vec![
         name("tau"),
         text(" = "),

@@ -39,9 +39,8 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
         let mut terms = effect.terms.iter();
         effect.other.is_none()
             && terms.any(|term| {
-                term.expression.mentions(
-                &|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()),
-            )
+                term.expression
+                    .mentions(&|symbol| matches!(symbol, modelmill_spec::ModelSymbol::Place(q) if q.is_other()))
             })
     };
     if mechanism.effects.iter().any(is_coupled) {
@@ -82,12 +81,7 @@ pub(super) fn effects(page: &mut PageDocument, mechanism: &Mechanism) {
 
 /// The contribution of an effect to the force: a sum of parameter times expression, or a text if it is a piece of
 /// mechanics.
-fn effect_contribution(
-    mechanism: &Mechanism,
-    effect: &ModelEffect,
-    each: &str,
-    other: &str,
-) -> TextLine {
+fn effect_contribution(mechanism: &Mechanism, effect: &ModelEffect, each: &str, other: &str) -> TextLine {
     // The parameters of the effect, one per term.
     let names: Vec<PrintedFormula> = (effect.terms.iter())
         .map(|term| PrintedFormula::name(&*mechanism.parameters[term.parameter.0].name))

@@ -69,10 +69,7 @@ pub struct RankSummary {
     /// Number of random states in eq. (9).
     pub samples: Option<usize>,
     /// The method, where columns were reduced numerically.
-    #[cfg_attr(
-        any(test, feature = "json"),
-        serde(skip_serializing_if = "Option::is_none")
-    )]
+    #[cfg_attr(any(test, feature = "json"), serde(skip_serializing_if = "Option::is_none"))]
     pub method: Option<NumericMethod>,
 }
 
@@ -161,11 +158,7 @@ impl ReducedEquations {
                 .map(|(k, factor)| (product(k), factor_text(mechanism, factor)))
                 .collect(),
         });
-        let without_effect: Vec<String> = reduction
-            .without_effect
-            .iter()
-            .map(|m| m.text(mechanism))
-            .collect();
+        let without_effect: Vec<String> = reduction.without_effect.iter().map(|m| m.text(mechanism)).collect();
         // Products without effect are lines with nothing on the right.
         let vanishing = without_effect.iter().map(|parameter| DependencyLine {
             parameter: parameter.clone(),
@@ -196,9 +189,7 @@ impl ReducedEquations {
             // Operations of a state; precomputed values are not counted.
             operations: ProgramOperations {
                 regressor: programs.regressor.count_operations(ProgramStage::State),
-                inverse_dynamics: programs
-                    .inverse_dynamics
-                    .count_operations(ProgramStage::State),
+                inverse_dynamics: programs.inverse_dynamics.count_operations(ProgramStage::State),
             },
             without_effect,
         }
@@ -207,8 +198,7 @@ impl ReducedEquations {
     /// As indented JSON with a line feed at the end; needs the feature `json`.
     #[cfg(any(test, feature = "json"))]
     pub fn json(&self) -> String {
-        let mut text =
-            serde_json::to_string_pretty(self).expect("strings and counts always make JSON");
+        let mut text = serde_json::to_string_pretty(self).expect("strings and counts always make JSON");
         // A text file ends with a line feed.
         text.push('\n');
         text

@@ -2,8 +2,8 @@
 //! Tables of frames, points, bodies and lumped masses.
 
 use modelmill_spec::{
-    CoordinateIdx, ExactExpression, FrameAxis, FrameConvention, FrameStep, FreeBody, Mechanism,
-    ModelFrame, PartInertia, TwistAxes,
+    CoordinateIdx, ExactExpression, FrameAxis, FrameConvention, FrameStep, FreeBody, Mechanism, ModelFrame,
+    PartInertia, TwistAxes,
 };
 
 use super::document::{InlineSpan, PageBlock, PageDocument, PageTable, TextLine, cell, code, text};
@@ -150,9 +150,7 @@ fn dh_parameters(mechanism: &Mechanism, frame: &ModelFrame) -> [PrintedFormula; 
     // The length along an axis.
     let translation = |wanted: FrameAxis| {
         PrintedFormula::sum(frame.steps.iter().filter_map(|step| match step {
-            FrameStep::Translate(axis, by) if *axis == wanted => {
-                Some(length_formula(mechanism, by))
-            }
+            FrameStep::Translate(axis, by) if *axis == wanted => Some(length_formula(mechanism, by)),
             _ => None,
         }))
     };
@@ -179,11 +177,7 @@ fn vector(mechanism: &Mechanism, at: &[ExactExpression; 3]) -> TextLine {
 }
 
 /// The entries of an inertia that are not zero, each after its name, or `0`.
-fn inertia_entries(
-    mechanism: &Mechanism,
-    names: [&str; 6],
-    values: &[ExactExpression; 6],
-) -> TextLine {
+fn inertia_entries(mechanism: &Mechanism, names: [&str; 6], values: &[ExactExpression; 6]) -> TextLine {
     let mut line = Vec::new();
     for (name, value) in names.iter().zip(values) {
         // Most inertias have few entries.
@@ -217,11 +211,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
         ];
         // Both forms have the same three columns, but the meaning of the last two differs, so each has a table.
         let (rows, mass, place, inertia) = match &part.inertial {
-            PartInertia::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => (&mut about_centre, mass, centre, inertia),
+            PartInertia::AboutCentre { mass, centre, inertia } => (&mut about_centre, mass, centre, inertia),
             PartInertia::Linear {
                 mass,
                 first_moment,
@@ -253,13 +243,7 @@ pub(super) fn bodies(page: &mut PageDocument, mechanism: &Mechanism) {
         page.paragraph([text(
             "Parts by mass, first moment, and inertia about the frame's origin. Entries not listed are zero.",
         )]);
-        let head = vec![
-            "part",
-            "frame",
-            "mass, kg",
-            "first moment, kg m",
-            "inertia, kg m²",
-        ];
+        let head = vec!["part", "frame", "mass, kg", "first moment, kg m", "inertia, kg m²"];
         page.table("parts", PageTable { head, rows: linear });
     }
     lumped_masses(page, mechanism);

@@ -70,16 +70,12 @@ pub(super) fn list_program(
         let wanted = match op {
             ProgramOp::Number(_) | ProgramOp::Input(_) | ProgramOp::Neg(_) => None,
             _ if names.contains_key(&i) => Some(names[&i].symbol.clone()),
-            ProgramOp::Sin(a) | ProgramOp::Cos(a) => {
-                Some(lister.trigonometric_symbol(op, a.index()))
-            }
+            ProgramOp::Sin(a) | ProgramOp::Cos(a) => Some(lister.trigonometric_symbol(op, a.index())),
             _ if simple => None,
             // An output used nowhere else is written where the outputs are.
             _ if is_output(i) && uses[i].count == 1 => None,
             // Functions always have a line of their own, because their arguments are long.
-            ProgramOp::Atan2(..) | ProgramOp::Unary(..) => {
-                Some(lister.next_symbol(program.stages[i]))
-            }
+            ProgramOp::Atan2(..) | ProgramOp::Unary(..) => Some(lister.next_symbol(program.stages[i])),
             _ if uses[i].count > 1
                 || count_leaves(&formula) > MOST_LEAVES
                 || (program.stages[i] == ProgramStage::Fixed && uses[i].by_state) =>
@@ -197,15 +193,10 @@ impl ListingBuilder<'_> {
     /// A symbol for a sine or cosine: `s_theta1`, `c_theta1`, ... An angle that is no sum of names is numbered.
     fn trigonometric_symbol(&mut self, op: &ProgramOp, angle: usize) -> FormulaSymbol {
         // The same angle may have a sine and a cosine.
-        let letter = if matches!(op, ProgramOp::Sin(_)) {
-            "s"
-        } else {
-            "c"
-        };
+        let letter = if matches!(op, ProgramOp::Sin(_)) { "s" } else { "c" };
         // The name of an angle is the same for its sine and cosine.
         if !self.angles.contains_key(&angle) {
-            let name = angle_name(&self.formulas[angle])
-                .unwrap_or_else(|| format!("angle{}", self.angles.len() + 1));
+            let name = angle_name(&self.formulas[angle]).unwrap_or_else(|| format!("angle{}", self.angles.len() + 1));
             self.angles.insert(angle, name);
         }
         let mut name = format!("{letter}_{}", self.angles[&angle]);
@@ -222,9 +213,7 @@ impl ListingBuilder<'_> {
         match op {
             ProgramOp::Number(n) => PrintedFormula::Number(n.clone()),
             ProgramOp::Input(a) => PrintedFormula::Symbol(atom(self.mechanism, *a)),
-            ProgramOp::Add(a, b) if a == b => {
-                PrintedFormula::product(Rational::integer(2), [at(a)])
-            }
+            ProgramOp::Add(a, b) if a == b => PrintedFormula::product(Rational::integer(2), [at(a)]),
             ProgramOp::Add(a, b) => PrintedFormula::sum([at(a), at(b)]),
             ProgramOp::Sub(a, b) => PrintedFormula::sum([at(a), at(b).negate()]),
             ProgramOp::Mul(a, b) => PrintedFormula::product(Rational::ONE, [at(a), at(b)]),
@@ -233,9 +222,7 @@ impl ListingBuilder<'_> {
             ProgramOp::Unary(function, a) => PrintedFormula::apply((*function).into(), at(a)),
             ProgramOp::Sin(a) => PrintedFormula::apply(FormulaFunction::Sin, at(a)),
             ProgramOp::Cos(a) => PrintedFormula::apply(FormulaFunction::Cos, at(a)),
-            ProgramOp::Atan2(y, x) => {
-                PrintedFormula::Apply(FormulaFunction::Atan2, vec![at(y), at(x)])
-            }
+            ProgramOp::Atan2(y, x) => PrintedFormula::Apply(FormulaFunction::Atan2, vec![at(y), at(x)]),
         }
     }
 }
@@ -245,11 +232,7 @@ fn count_leaves(formula: &PrintedFormula) -> usize {
     match formula {
         PrintedFormula::Number(_) | PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) => 1,
         PrintedFormula::Sum(terms) => terms.iter().map(count_leaves).sum(),
-        PrintedFormula::Term {
-            factor,
-            above,
-            below,
-        } => {
+        PrintedFormula::Term { factor, above, below } => {
             // A factor of one is not printed.
             let number = usize::from(!factor.abs().is_one());
             number + above.iter().chain(below).map(count_leaves).sum::<usize>()
@@ -267,11 +250,7 @@ fn angle_name(formula: &PrintedFormula) -> Option<String> {
             let names: Option<Vec<String>> = terms.iter().map(angle_name).collect();
             Some(names?.join("_"))
         }
-        PrintedFormula::Term {
-            factor,
-            above,
-            below,
-        } if below.is_empty() => {
+        PrintedFormula::Term { factor, above, below } if below.is_empty() => {
             let [PrintedFormula::Symbol(symbol)] = above.as_slice() else {
                 return None;
             };

@@ -3,9 +3,7 @@
 
 use modelmill_spec::{DriveKind, Mechanism, PlaceLoad};
 
-use super::document::{
-    InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, code, text,
-};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, code, text};
 use crate::expr::print::{PrintedFormula, angle_sum_formula, formula, tree_size};
 use crate::expr::{ExprId, Graph, Rational, nominal_value};
 use crate::{Derivation, PassivePosition};
@@ -18,15 +16,9 @@ fn coordinate_names(mechanism: &Mechanism, coordinates: &[usize]) -> TextLine {
     let mut line = TextLine::new();
     for (i, c) in coordinates.iter().enumerate() {
         if i > 0 {
-            line.push(text(if i + 1 == coordinates.len() {
-                " and "
-            } else {
-                ", "
-            }));
+            line.push(text(if i + 1 == coordinates.len() { " and " } else { ", " }));
         }
-        line.push(InlineSpan::Math(PrintedFormula::name(
-            &*mechanism.coordinates[*c].name,
-        )));
+        line.push(InlineSpan::Math(PrintedFormula::name(&*mechanism.coordinates[*c].name)));
     }
     line
 }
@@ -118,8 +110,9 @@ pub(super) fn loops(page: &mut PageDocument, derivation: &Derivation) {
             })
         })
         .collect();
-    let mut says = "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
-        .to_owned();
+    let mut says =
+        "Their rates and accelerations follow from the differentiated closure equations, which are linear in them."
+            .to_owned();
     // Determinants that are too long are not listed.
     if determinants.is_empty() {
         says.push_str(" A pose where their matrix is singular is reported.");
@@ -262,10 +255,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
                         PlaceLoad::Torque => "torque on ",
                         _ => "force on ",
                     };
-                    vec![
-                        text(kind),
-                        InlineSpan::Math(PrintedFormula::name(&*coordinate.name)),
-                    ]
+                    vec![text(kind), InlineSpan::Math(PrintedFormula::name(&*coordinate.name))]
                 }
                 DriveKind::Linear { from, to } => {
                     any_linear = true;
@@ -313,12 +303,7 @@ pub(super) fn drives(page: &mut PageDocument, derivation: &Derivation) {
         // The length.
         line(format!("l_{}", drive.name), projection.drives[d].coordinate);
         // The row of the Jacobian.
-        for (a, slope) in projection
-            .loops
-            .active
-            .iter()
-            .zip(&projection.drive_jacobian[d])
-        {
+        for (a, slope) in projection.loops.active.iter().zip(&projection.drive_jacobian[d]) {
             let coordinate = &mechanism.coordinates[*a].name;
             line(format!("J_{}_{coordinate}", drive.name), *slope);
         }

@@ -23,8 +23,7 @@ pub(crate) mod tests;
 
 pub use base_parameters::{base_expression, base_summand, factored_base_expression};
 pub use equations::{
-    BaseParameterLine, DependencyLine, NumericMethod, ProgramOperations, RankSummary,
-    ReducedEquations,
+    BaseParameterLine, DependencyLine, NumericMethod, ProgramOperations, RankSummary, ReducedEquations,
 };
 pub use rank::NumericRank;
 
@@ -61,9 +60,7 @@ pub fn page(derivation: &Derivation, format: PageFormat, numeric: Option<&Numeri
         PageFormat::Markdown => render_markdown::render(&document()),
         PageFormat::Latex => render_latex::render(&document()),
         // The picture is part of the HTML page only.
-        PageFormat::Html => {
-            render_html::render(&document(), &mechanism_picture(&derivation.mechanism))
-        }
+        PageFormat::Html => render_html::render(&document(), &mechanism_picture(&derivation.mechanism)),
         #[cfg(any(test, feature = "json"))]
         PageFormat::Json => ReducedEquations::new(derivation, numeric).json(),
     }

@@ -62,10 +62,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
     let head = vec!["symbol", "value", "unit", "meaning"];
     page.table("constants", PageTable { head, rows });
     // Gravity is a vector of expressions in the model's constants.
-    let gravity = mechanism
-        .gravity
-        .each_ref()
-        .map(|g| exact_formula(mechanism, g));
+    let gravity = mechanism.gravity.each_ref().map(|g| exact_formula(mechanism, g));
     // A model without gravity states so.
     if gravity.iter().all(PrintedFormula::is_zero) {
         page.paragraph([text("Gravity does not act.")]);
@@ -114,11 +111,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
         .map(|(i, c)| {
             let in_unit = c.motion.unit();
             // Angles are in rad, lengths in m.
-            let kind = if c.motion.is_angle() {
-                "angle"
-            } else {
-                "length"
-            };
+            let kind = if c.motion.is_angle() { "angle" } else { "length" };
             // Coupled and passive coordinates are computed; all others are inputs.
             let role = if follows(i) {
                 "passive, coupled to others"
@@ -132,9 +125,7 @@ pub(super) fn quantities(page: &mut PageDocument, mechanism: &Mechanism) {
                 cell(text(kind)),
                 // Six decimals without trailing zeros.
                 cell(text(
-                    format!("{:.6}", c.nominal)
-                        .trim_end_matches('0')
-                        .trim_end_matches('.'),
+                    format!("{:.6}", c.nominal).trim_end_matches('0').trim_end_matches('.'),
                 )),
                 cell(unit(in_unit)),
                 cell(text(role)),

@@ -4,9 +4,7 @@ use std::collections::BTreeSet;
 
 use modelmill_spec::{DriveKind, ModelDrive};
 
-use super::document::{
-    PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text,
-};
+use super::document::{PageBlock, PageDocument, PageEquation, PageTable, TextLine, cell, name, text};
 use super::listing::{self, ProgramListing};
 use crate::expr::print::{FormulaSymbol, PrintedFormula};
 use crate::lower::{OperationCount, ProgramStage, StraightLineProgram};
@@ -36,38 +34,25 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
         if program.outputs.is_empty() {
             continue;
         }
-        for (stage, when) in [
-            (ProgramStage::State, "state"),
-            (ProgramStage::Fixed, "geometry"),
-        ] {
+        for (stage, when) in [(ProgramStage::State, "state"), (ProgramStage::Fixed, "geometry")] {
             // Operations by kind.
             let count = program.count_operations(stage);
             // A program that does nothing at a state, or nothing beforehand, needs no line for it.
             if count == OperationCount::default()
-                && (stage == ProgramStage::Fixed
-                    || program.count_operations(ProgramStage::Fixed) != count)
+                && (stage == ProgramStage::Fixed || program.count_operations(ProgramStage::Fixed) != count)
             {
                 continue;
             }
             let mut row = vec![cell(text(what)), cell(text(when))];
             // One column per kind of operation.
             row.extend(
-                [
-                    count.add,
-                    count.mul,
-                    count.div,
-                    count.sqrt,
-                    count.sincos,
-                    count.other,
-                ]
-                .map(|n| cell(text(n.to_string()))),
+                [count.add, count.mul, count.div, count.sqrt, count.sincos, count.other]
+                    .map(|n| cell(text(n.to_string()))),
             );
             rows.push(row);
         }
     }
-    let head = vec![
-        "program", "per", "+ -", "*", "/", "sqrt", "sin cos", "other",
-    ];
+    let head = vec!["program", "per", "+ -", "*", "/", "sqrt", "sin cos", "other"];
     page.blocks.push(PageBlock::Table(PageTable { head, rows }));
 
     // The legend comes first, then one folded listing per program.
@@ -83,12 +68,7 @@ pub(super) fn programs(page: &mut PageDocument, derivation: &Derivation) {
 }
 
 /// A listing with its title, the symbols of the outputs and the program that it shows.
-pub(super) type ListedProgram<'a> = (
-    String,
-    Vec<FormulaSymbol>,
-    &'a StraightLineProgram,
-    ProgramListing,
-);
+pub(super) type ListedProgram<'a> = (String, Vec<FormulaSymbol>, &'a StraightLineProgram, ProgramListing);
 
 /// The programs that the page lists: passive coordinates, drives, regressor. Those that the model does not need are
 /// left out.
@@ -126,9 +106,9 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
     if !passive.is_empty() && matches!(programs.passive_position, PassivePosition::Closed) {
         let outputs: Vec<FormulaSymbol> = (0..3)
             .flat_map(|order| {
-                passive.iter().map(move |p| {
-                    FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order)
-                })
+                passive
+                    .iter()
+                    .map(move |p| FormulaSymbol::time_derivative(&*mechanism.coordinates[*p].name, order))
             })
             .collect();
         listings.push((
@@ -153,9 +133,9 @@ pub(super) fn listings(derivation: &Derivation) -> Vec<ListedProgram<'_>> {
         }
         for d in &mechanism.drives {
             // One entry of the Jacobian per active coordinate.
-            let row = active.iter().map(|a| {
-                FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name))
-            });
+            let row = active
+                .iter()
+                .map(|a| FormulaSymbol::new(format!("J_{}_{}", d.name, mechanism.coordinates[*a].name)));
             outputs.extend(row);
         }
         listings.push(("Drives and their Jacobian", outputs, &programs.drives, "D"));
@@ -206,14 +186,8 @@ const LETTERS: [(&[&str], &str); 10] = [
         "position of a point or a frame's origin, in the base frame's axes; with two names, the vector from the first to the second",
     ),
     (&["e", "l"], "vector along a linear drive, and its length"),
-    (
-        &["J"],
-        "derivative of a drive's length with respect to a coordinate",
-    ),
-    (
-        &["Delta"],
-        "determinant of a small linear system, and its inverse",
-    ),
+    (&["J"], "derivative of a drive's length with respect to a coordinate"),
+    (&["Delta"], "determinant of a small linear system, and its inverse"),
     (&["k"], "value computed once per geometry"),
     (&["x"], "any other intermediate value"),
 ];
@@ -252,11 +226,7 @@ fn add_legend(page: &mut PageDocument, listings: &[ListedProgram<'_>]) {
 
 /// Whether a symbol is a coordinate, drive length or Jacobian entry, and not an entry of H_min.
 fn is_motion(derivation: &Derivation, symbol: &FormulaSymbol) -> bool {
-    derivation
-        .mechanism
-        .coordinates
-        .iter()
-        .any(|c| c.name == symbol.name)
+    derivation.mechanism.coordinates.iter().any(|c| c.name == symbol.name)
         || symbol.name.starts_with("l_")
         || symbol.name.starts_with("J_")
 }
@@ -284,6 +254,5 @@ fn add_folded_listing(page: &mut PageDocument, title: &str, listing: ProgramList
     };
     part("Once per geometry:", fixed);
     part("At every state:", state);
-    page.blocks
-        .push(PageBlock::Folded(title.to_owned(), blocks));
+    page.blocks.push(PageBlock::Folded(title.to_owned(), blocks));
 }

@@ -145,9 +145,9 @@ fn math(content: &str) -> String {
 
 /// Each segment of a formula is a formula of its own, so that the browser can break a long sum between them.
 fn mathml_segments(formula: &PrintedFormula) -> String {
-    let stretches = formula.mathml_segments();
-    let stretches: Vec<String> = stretches.iter().map(|one| math(one)).collect();
-    stretches.join(" ")
+    let segments = formula.mathml_segments();
+    let segments: Vec<String> = segments.iter().map(|one| math(one)).collect();
+    segments.join(" ")
 }
 
 /// Spans of a line; plain numbers are prose with a minus sign, not formulas.

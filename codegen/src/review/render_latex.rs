@@ -4,9 +4,7 @@ use std::fmt::Write;
 
 use modelmill_boundary::text::latex as escape;
 
-use super::document::{
-    InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, line_terms,
-};
+use super::document::{InlineSpan, PageBlock, PageDocument, PageEquation, PageTable, TextLine, line_terms};
 use crate::expr::print::PrintedFormula;
 
 /// Length of the plain text of a line of an equation, beyond which it is broken.
@@ -123,11 +121,7 @@ fn break_sum(formula: &PrintedFormula) -> Vec<String> {
         .enumerate()
         .map(|(i, (_, line))| {
             // A continued line begins with the sign of its first term.
-            let leading = if i > 0 && !line[0].is_negative() {
-                "+ "
-            } else {
-                ""
-            };
+            let leading = if i > 0 && !line[0].is_negative() { "+ " } else { "" };
             // The first term stays first even if it is negative.
             let sum = if line.len() == 1 {
                 line[0].latex()

@@ -48,11 +48,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
 fn write_equations(out: &mut String, equations: &[PageEquation]) {
     // Many formulas are slow to display, and hard to copy.
     if equations.len() > MOST_DISPLAYED {
-        _ = writeln!(
-            out,
-            "```text\n{}```\n",
-            render_text::equation_lines(equations)
-        );
+        _ = writeln!(out, "```text\n{}```\n", render_text::equation_lines(equations));
         return;
     }
     for equation in equations {

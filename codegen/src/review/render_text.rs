@@ -53,9 +53,7 @@ fn blocks(out: &mut String, blocks: &[PageBlock]) {
 pub(super) fn plain_text(line: &TextLine) -> String {
     line.iter()
         .map(|inline| match inline {
-            InlineSpan::Text(text) | InlineSpan::Code(text) | InlineSpan::Unit(text) => {
-                text::plain(text).into_owned()
-            }
+            InlineSpan::Text(text) | InlineSpan::Code(text) | InlineSpan::Unit(text) => text::plain(text).into_owned(),
             InlineSpan::Math(formula) => formula.text(),
         })
         .collect()
@@ -119,11 +117,7 @@ fn write_table(out: &mut String, table: &PageTable) {
 /// Equations one below the other with right-aligned tags; long ones are broken after a term.
 pub(super) fn equation_lines(equations: &[PageEquation]) -> String {
     // Tags are right-aligned, so that the equations begin in one column.
-    let widest = equations
-        .iter()
-        .map(|e| e.tag.chars().count() + 2)
-        .max()
-        .unwrap_or(0);
+    let widest = equations.iter().map(|e| e.tag.chars().count() + 2).max().unwrap_or(0);
     let mut out = String::new();
     for equation in equations {
         // The tag comes first, so that equations can be found by it.

@@ -6,10 +6,7 @@ use std::path::PathBuf;
 
 use modelmill_spec::Mechanism;
 
-use super::{
-    NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page,
-    programs,
-};
+use super::{NumericRank, PageFormat, ReducedEquations, base_expression, factored_base_expression, page, programs};
 use crate::expr::Atom;
 use crate::expr::print::parse::parse;
 use crate::expr::print::tests::{latex_is_balanced, markup_is_balanced};
@@ -50,9 +47,7 @@ fn values(derivation: &Derivation) -> (Vec<f64>, Vec<f64>, BTreeMap<String, f64>
     let odd = |i: usize| 0.7 + ((i * 37 + 11) % 29) as f64 / 17.0;
     let mechanism = &derivation.mechanism;
     let constants: Vec<f64> = (0..mechanism.constants.len()).map(odd).collect();
-    let parameters: Vec<f64> = (0..mechanism.parameters.len())
-        .map(|i| odd(i + 5))
-        .collect();
+    let parameters: Vec<f64> = (0..mechanism.parameters.len()).map(|i| odd(i + 5)).collect();
     let mut names = BTreeMap::new();
     for (c, v) in mechanism.constants.iter().zip(&constants) {
         names.insert(c.name.clone(), *v);
@@ -112,11 +107,7 @@ fn every_product_is_retained_or_depends_on_retained_ones() {
     for name in MODELS {
         let equations = ReducedEquations::new(&derivation(name), None);
         let retained: BTreeSet<&String> = equations.base.iter().map(|b| &b.retained).collect();
-        let dependent: BTreeSet<&String> = equations
-            .dependencies
-            .iter()
-            .map(|d| &d.parameter)
-            .collect();
+        let dependent: BTreeSet<&String> = equations.dependencies.iter().map(|d| &d.parameter).collect();
         for product in &equations.parameters {
             assert!(retained.contains(product) != dependent.contains(product));
         }
@@ -167,17 +158,9 @@ fn listed_programs_compute_what_the_programs_compute() {
 fn named_values_are_what_they_are_called() {
     let derivation = derivation("spidermill");
     let meanings = NamedQuantities::new(&derivation);
-    let (_, _, program, listing) = programs::listings(&derivation)
-        .pop()
-        .expect("the regressor is last");
+    let (_, _, program, listing) = programs::listings(&derivation).pop().expect("the regressor is last");
     let lines: BTreeSet<String> = listing.state.iter().map(|e| e.left.text()).collect();
-    for wanted in [
-        "c_theta1",
-        "omega_S3_z",
-        "omega_S3_z_d",
-        "c_gamma1",
-        "l_spindle_left",
-    ] {
+    for wanted in ["c_theta1", "omega_S3_z", "omega_S3_z_d", "c_gamma1", "l_spindle_left"] {
         assert!(lines.contains(wanted), "{wanted} in {lines:?}");
     }
     let values = meanings.values(program);
@@ -189,11 +172,7 @@ fn named_values_are_what_they_are_called() {
         .expect("a name in the listing");
     let sign = if meaning.negative { -1.0 } else { 1.0 };
     let (theta1, gamma1) = (0, 2);
-    assert_close(
-        sign * values[*at],
-        rate(theta1) + rate(gamma1),
-        "omega_S3_z",
-    );
+    assert_close(sign * values[*at], rate(theta1) + rate(gamma1), "omega_S3_z");
 }
 
 #[test]
@@ -213,29 +192,19 @@ fn pages_are_whole_and_the_same_every_time() {
             PageFormat::Json,
         ] {
             let text = page(&one, format, Some(&numeric));
-            assert_eq!(
-                text,
-                page(&two, format, Some(&numeric)),
-                "{name} {format:?}"
-            );
+            assert_eq!(text, page(&two, format, Some(&numeric)), "{name} {format:?}");
             assert!(text.ends_with('\n'));
         }
         let html = page(&one, PageFormat::Html, None);
         let without_scripts: String = html
             .split("<script>")
-            .map(|piece| {
-                piece
-                    .split_once("</script>")
-                    .map_or(piece, |(_, rest)| rest)
-            })
+            .map(|piece| piece.split_once("</script>").map_or(piece, |(_, rest)| rest))
             .collect();
         assert!(markup_is_balanced(&without_scripts), "{name}");
         // The page loads no other file.
         assert!(!html.contains("src=") && !html.contains("http") && !html.contains("url("));
         let latex = page(&one, PageFormat::Latex, None);
-        assert!(latex_is_balanced(
-            &latex.replace("\\{", "").replace("\\}", "")
-        ));
+        assert!(latex_is_balanced(&latex.replace("\\{", "").replace("\\}", "")));
         let count = |what: &str| latex.matches(what).count();
         assert_eq!(count("\\begin{"), count("\\end{"));
     }
@@ -273,10 +242,7 @@ fn json_has_the_fields_of_the_contract() {
         }
     }
     let last = json["dependencies"].as_array().and_then(|d| d.last());
-    assert_eq!(
-        last,
-        Some(&serde_json::json!({"parameter": "m1", "equals": {}}))
-    );
+    assert_eq!(last, Some(&serde_json::json!({"parameter": "m1", "equals": {}})));
 }
 
 /// Eq. (5), (6) and (16) in a few lines.
@@ -287,16 +253,8 @@ fn summary(name: &str) -> String {
         format!("p_g: {}", equations.parameters.join(", ")),
         format!("without effect: {}", equations.without_effect.join(", ")),
     ];
-    for line in equations
-        .dependencies
-        .iter()
-        .filter(|d| !d.equals.is_empty())
-    {
-        let right: Vec<String> = line
-            .equals
-            .iter()
-            .map(|(r, k)| format!("({k}) h[{r}]"))
-            .collect();
+    for line in equations.dependencies.iter().filter(|d| !d.equals.is_empty()) {
+        let right: Vec<String> = line.equals.iter().map(|(r, k)| format!("({k}) h[{r}]")).collect();
         lines.push(format!("h[{}] = {}", line.parameter, right.join(" + ")));
     }
     for (k, base) in equations.base.iter().enumerate() {

@@ -34,15 +34,12 @@ pub(crate) fn may_be_undefined(mechanism: &Mechanism) -> bool {
 fn is_partial(expression: &ExactExpression) -> bool {
     match expression {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => false,
-        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => {
-            operands.iter().any(is_partial)
-        }
+        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => operands.iter().any(is_partial),
         ExactExpression::Quotient(a, b) => is_partial(a) || is_partial(b) || has_motion(b),
         ExactExpression::Negative(a) => is_partial(a),
         ExactExpression::Power(a, n) => is_partial(a) || (*n < 0 && has_motion(a)),
         ExactExpression::Apply(function, a) => {
-            is_partial(a)
-                || (matches!(function, ExactFunction::Sqrt | ExactFunction::Exp) && has_motion(a))
+            is_partial(a) || (matches!(function, ExactFunction::Sqrt | ExactFunction::Exp) && has_motion(a))
         }
     }
 }
@@ -54,12 +51,8 @@ fn has_motion(expression: &ExactExpression) -> bool {
         ExactExpression::Symbol(symbol) => {
             matches!(symbol, ModelSymbol::Place(_) | ModelSymbol::Coordinate(_))
         }
-        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => {
-            operands.iter().any(has_motion)
-        }
+        ExactExpression::Sum(operands) | ExactExpression::Product(operands) => operands.iter().any(has_motion),
         ExactExpression::Quotient(a, b) => has_motion(a) || has_motion(b),
-        ExactExpression::Negative(a)
-        | ExactExpression::Power(a, _)
-        | ExactExpression::Apply(_, a) => has_motion(a),
+        ExactExpression::Negative(a) | ExactExpression::Power(a, _) | ExactExpression::Apply(_, a) => has_motion(a),
     }
 }

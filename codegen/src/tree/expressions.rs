@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use modelmill_spec::{
-    CoordinateIdx, ExactAngle, ExactExpression, ExactFunction, ExactLength, Mechanism, ModelSymbol,
-    PlaceQuantity,
+    CoordinateIdx, ExactAngle, ExactExpression, ExactFunction, ExactLength, Mechanism, ModelSymbol, PlaceQuantity,
 };
 use num_traits::ToPrimitive;
 
@@ -32,9 +31,7 @@ impl ParameterMonomial {
 
     /// The parameters, each as often as its power states.
     fn repeated_parameters(&self) -> impl Iterator<Item = usize> {
-        self.0
-            .iter()
-            .flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
+        self.0.iter().flat_map(|(p, n)| std::iter::repeat_n(*p, *n as usize))
     }
 
     /// As infix text: `m1*dc1^2`.
@@ -47,11 +44,7 @@ impl ParameterMonomial {
             .iter()
             .map(|(p, n)| {
                 let name = &mechanism.parameters[*p].name;
-                if *n == 1 {
-                    name.clone()
-                } else {
-                    format!("{name}^{n}")
-                }
+                if *n == 1 { name.clone() } else { format!("{name}^{n}") }
             })
             .collect();
         factors.join("*")
@@ -125,20 +118,15 @@ impl ParameterPolynomial {
         for (m, a) in &self.0 {
             for (n, b) in &other.0 {
                 let value = graph.mul(*a, *b);
-                terms
-                    .entry(m.times(n))
-                    .or_default()
-                    .push((value, Rational::ONE));
+                terms.entry(m.times(n)).or_default().push((value, Rational::ONE));
                 if terms.len() > MOST_TERMS {
                     return Err(DeriveError::TooManyTerms { limit: MOST_TERMS });
                 }
             }
         }
         // Coefficients of equal monomials are added, and those that cancel are dropped.
-        let mut product: BTreeMap<ParameterMonomial, ExprId> = terms
-            .into_iter()
-            .map(|(m, values)| (m, graph.sum(&values)))
-            .collect();
+        let mut product: BTreeMap<ParameterMonomial, ExprId> =
+            terms.into_iter().map(|(m, values)| (m, graph.sum(&values))).collect();
         product.retain(|_, value| *value != Graph::ZERO);
         Ok(Self(product))
     }
@@ -188,10 +176,7 @@ pub(crate) fn length(graph: &mut Graph, length: &ExactLength) -> Result<ExprId, 
 ///
 /// # Errors
 /// [`DeriveError`] if it has any of these, or divides by zero.
-pub(crate) fn expression(
-    graph: &mut Graph,
-    exact: &ExactExpression,
-) -> Result<ExprId, DeriveError> {
+pub(crate) fn expression(graph: &mut Graph, exact: &ExactExpression) -> Result<ExprId, DeriveError> {
     expression_at(graph, exact, &|_| None)
 }
 
@@ -217,10 +202,7 @@ pub(crate) fn expression_at(
 }
 
 /// An expression without quantities of a place, as a polynomial in the dynamic parameters.
-pub(crate) fn polynomial(
-    graph: &mut Graph,
-    exact: &ExactExpression,
-) -> Result<ParameterPolynomial, DeriveError> {
+pub(crate) fn polynomial(graph: &mut Graph, exact: &ExactExpression) -> Result<ParameterPolynomial, DeriveError> {
     polynomial_at(graph, exact, &|_| None)
 }
 
@@ -235,9 +217,9 @@ fn polynomial_at(
             ParameterPolynomial::constant(graph.rational(Rational::from(value.clone())))
         }
         ExactExpression::Pi => ParameterPolynomial::constant(graph.atom(Atom::Pi)),
-        ExactExpression::Symbol(ModelSymbol::Parameter(i)) => ParameterPolynomial(BTreeMap::from(
-            [(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)],
-        )),
+        ExactExpression::Symbol(ModelSymbol::Parameter(i)) => {
+            ParameterPolynomial(BTreeMap::from([(ParameterMonomial(vec![(i.0, 1)]), Graph::ONE)]))
+        }
         // Quantities of places exist only inside effects.
         ExactExpression::Symbol(ModelSymbol::Place(quantity)) => match place(*quantity) {
             Some(value) => ParameterPolynomial::constant(value),
@@ -274,9 +256,7 @@ fn polynomial_at(
             let inverse = ParameterPolynomial::constant(graph.pow(divisor, -1));
             polynomial_at(graph, a, place)?.times(&inverse, graph)?
         }
-        ExactExpression::Negative(a) => {
-            polynomial_at(graph, a, place)?.scale(&Rational::MINUS_ONE, graph)
-        }
+        ExactExpression::Negative(a) => polynomial_at(graph, a, place)?.scale(&Rational::MINUS_ONE, graph),
         ExactExpression::Power(a, n) if *n < 0 => {
             let base = expression_at(graph, a, place)?;
             if base == Graph::ZERO {
@@ -296,17 +276,14 @@ fn polynomial_at(
         // Sines and cosines of exact angles stay exact; other arguments become nodes of their own.
         ExactExpression::Apply(function, a) => {
             // An exact angle, if the argument is one.
-            if let (ExactFunction::Sin | ExactFunction::Cos, Some((sum, pi12))) =
-                (function, AngleAccumulator::angle(a))
+            if let (ExactFunction::Sin | ExactFunction::Cos, Some((sum, pi12))) = (function, AngleAccumulator::angle(a))
             {
                 let (c, s) = graph.cos_sin(&sum, pi12);
-                return Ok(ParameterPolynomial::constant(
-                    if *function == ExactFunction::Sin {
-                        s
-                    } else {
-                        c
-                    },
-                ));
+                return Ok(ParameterPolynomial::constant(if *function == ExactFunction::Sin {
+                    s
+                } else {
+                    c
+                }));
             }
             let argument = expression_at(graph, a, place)?;
             ParameterPolynomial::constant(graph.unary(unary(*function), argument))
@@ -332,9 +309,7 @@ pub(crate) fn name_place_coordinate(
         ExactExpression::Symbol(ModelSymbol::Place(found)) if *found == quantity => {
             ExactExpression::Symbol(ModelSymbol::Coordinate(coordinate))
         }
-        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => {
-            exact.clone()
-        }
+        ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => exact.clone(),
         ExactExpression::Sum(operands) => ExactExpression::Sum(all(operands)),
         ExactExpression::Product(operands) => ExactExpression::Product(all(operands)),
         ExactExpression::Quotient(a, b) => ExactExpression::Quotient(inner(a), inner(b)),
@@ -380,11 +355,7 @@ impl AngleAccumulator {
         let twelfths = &parts.pi * &Rational::integer(12);
         let (n, _) = twelfths.as_small().filter(|(_, d)| *d == 1)?;
         let pi12 = i32::try_from(n.rem_euclid(24)).ok()?;
-        let atoms: Option<Vec<_>> = parts
-            .atoms
-            .iter()
-            .map(|(a, k)| Some((*a, integer(k)?)))
-            .collect();
+        let atoms: Option<Vec<_>> = parts.atoms.iter().map(|(a, k)| Some((*a, integer(k)?))).collect();
         Some((AtomAngleSum::new(atoms?), pi12))
     }
 
@@ -393,9 +364,7 @@ impl AngleAccumulator {
         match exact {
             ExactExpression::Rational(value) if Rational::from(value.clone()).is_zero() => {}
             ExactExpression::Pi => self.pi = &self.pi + factor,
-            ExactExpression::Symbol(
-                symbol @ (ModelSymbol::Constant(_) | ModelSymbol::Coordinate(_)),
-            ) => {
+            ExactExpression::Symbol(symbol @ (ModelSymbol::Constant(_) | ModelSymbol::Coordinate(_))) => {
                 self.atoms.push((atom(*symbol), factor.clone()));
             }
             ExactExpression::Sum(operands) => {

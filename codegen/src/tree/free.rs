@@ -31,8 +31,7 @@ fn coordinate_atoms<const N: usize>(
 
 /// The square of the length of a body's quaternion.
 pub(crate) fn quaternion_square(graph: &mut Graph, body: &FreeBody) -> ExprId {
-    let squares =
-        coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
+    let squares = coordinate_atoms(graph, Atom::Coordinate, body.quaternion).map(|x| graph.mul(x, x));
     graph.add_all(&squares)
 }
 
@@ -67,12 +66,7 @@ fn rotation_matrix(graph: &mut Graph, body: &FreeBody) -> [SymbolicVector; 3] {
 }
 
 /// Components in a body's axes of a vector that is given in the `axes` of a twist.
-pub(crate) fn to_body(
-    graph: &mut Graph,
-    body: &FreeBody,
-    axes: TwistAxes,
-    v: &SymbolicVector,
-) -> SymbolicVector {
+pub(crate) fn to_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => {
@@ -86,12 +80,7 @@ pub(crate) fn to_body(
 }
 
 /// Components in the `axes` of a twist of a vector that is given in a body's axes.
-pub(crate) fn from_body(
-    graph: &mut Graph,
-    body: &FreeBody,
-    axes: TwistAxes,
-    v: &SymbolicVector,
-) -> SymbolicVector {
+pub(crate) fn from_body(graph: &mut Graph, body: &FreeBody, axes: TwistAxes, v: &SymbolicVector) -> SymbolicVector {
     match axes {
         TwistAxes::Body => *v,
         TwistAxes::World => rotation_matrix(graph, body).map(|row| graph.dot(&row, v)),

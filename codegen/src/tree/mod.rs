@@ -67,11 +67,7 @@ impl TreeLink {
         }
         // The direction of z in the parent's frame.
         let z = [Graph::ZERO, Graph::ZERO, Graph::ONE];
-        let z = self
-            .pre
-            .iter()
-            .rev()
-            .fold(z, |v, turn| graph.rotate_out(turn, &v));
+        let z = self.pre.iter().rev().fold(z, |v, turn| graph.rotate_out(turn, &v));
         let minus = graph.neg(Graph::ONE);
         (self.across, self.along, self.axis) = (self.position, Graph::ZERO, None);
         // The joint is along an axis of the parent if exactly one component is 1 or -1.
@@ -168,12 +164,7 @@ impl KinematicTree {
     }
 
     /// Components in the link's frame of a vector given in its parent's frame.
-    pub(crate) fn to_link(
-        &self,
-        graph: &mut Graph,
-        link: usize,
-        v: &SymbolicVector,
-    ) -> SymbolicVector {
+    pub(crate) fn to_link(&self, graph: &mut Graph, link: usize, v: &SymbolicVector) -> SymbolicVector {
         let link = &self.links[link];
         let mut v = *v;
         for turn in &link.pre {
@@ -250,12 +241,7 @@ impl Builder {
     }
 
     /// Adds one step of the model file; may end the link and begin another.
-    fn add_step(
-        &mut self,
-        graph: &mut Graph,
-        links: &mut Vec<TreeLink>,
-        step: &FrameStep,
-    ) -> Result<(), DeriveError> {
+    fn add_step(&mut self, graph: &mut Graph, links: &mut Vec<TreeLink>, step: &FrameStep) -> Result<(), DeriveError> {
         match step {
             // In a valid file this is the only step of a frame on the base.
             FrameStep::Free(body) => self.free = Some(*body),
@@ -273,33 +259,17 @@ impl Builder {
                         }
                     })
                     .collect();
-                let turn = AxisRotation {
-                    axis: *axis,
-                    sum,
-                    pi12,
-                };
-                self.add_step_about_z(
-                    graph,
-                    links,
-                    *axis,
-                    !turns.is_empty(),
-                    |builder, _, axis| {
-                        // Fixed rotations before a joint stay separate; after it they are part of the joint's angle.
-                        if turns.is_empty() && !builder.has_joint() {
-                            push_rotation(
-                                &mut builder.pre,
-                                &AxisRotation {
-                                    axis,
-                                    ..turn.clone()
-                                },
-                            );
-                        } else {
-                            builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
-                            builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
-                            builder.turns.extend(&turns);
-                        }
-                    },
-                );
+                let turn = AxisRotation { axis: *axis, sum, pi12 };
+                self.add_step_about_z(graph, links, *axis, !turns.is_empty(), |builder, _, axis| {
+                    // Fixed rotations before a joint stay separate; after it they are part of the joint's angle.
+                    if turns.is_empty() && !builder.has_joint() {
+                        push_rotation(&mut builder.pre, &AxisRotation { axis, ..turn.clone() });
+                    } else {
+                        builder.joint.sum = builder.joint.sum.plus(&turn.sum, 1);
+                        builder.joint.pi12 = (builder.joint.pi12 + turn.pi12).rem_euclid(24);
+                        builder.turns.extend(&turns);
+                    }
+                });
             }
             FrameStep::Translate(axis, length) => {
                 let value = expressions::length(graph, length)?;
@@ -308,22 +278,16 @@ impl Builder {
                     .iter()
                     .map(|(c, k)| (c.0, Rational::from(k.clone())))
                     .collect();
-                self.add_step_about_z(
-                    graph,
-                    links,
-                    *axis,
-                    !slides.is_empty(),
-                    |builder, graph, axis| {
-                        // The translation in the axes of the parent.
-                        let mut along = vector::ZERO;
-                        along[axis as usize] = value;
-                        for turn in builder.pre.iter().rev() {
-                            along = graph.rotate_out(turn, &along);
-                        }
-                        builder.position = graph.add_vectors(&[builder.position, along]);
-                        builder.slides.extend(slides.iter().cloned());
-                    },
-                );
+                self.add_step_about_z(graph, links, *axis, !slides.is_empty(), |builder, graph, axis| {
+                    // The translation in the axes of the parent.
+                    let mut along = vector::ZERO;
+                    along[axis as usize] = value;
+                    for turn in builder.pre.iter().rev() {
+                        along = graph.rotate_out(turn, &along);
+                    }
+                    builder.position = graph.add_vectors(&[builder.position, along]);
+                    builder.slides.extend(slides.iter().cloned());
+                });
             }
         }
         Ok(())

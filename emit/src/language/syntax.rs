@@ -54,10 +54,7 @@ pub(crate) trait LanguageSyntax {
         binding: OperatorPrecedence,
     ) -> String {
         // Whether both operands are numbers.
-        let both = matches!(
-            (a, b),
-            (CodeExpression::Number(_), CodeExpression::Number(_))
-        );
+        let both = matches!((a, b), (CodeExpression::Number(_), CodeExpression::Number(_)));
         let left = if both {
             self.operand_text(a)
         } else {

@@ -25,11 +25,7 @@ const GROUP: usize = 250;
 
 impl StatementRoutine {
     /// The statements of a program. `outputs` are names for its results, possibly none.
-    pub(crate) fn new(
-        program: &StraightLineProgram,
-        scope: &NameScope,
-        outputs: &[String],
-    ) -> Self {
+    pub(crate) fn new(program: &StraightLineProgram, scope: &NameScope, outputs: &[String]) -> Self {
         Self::with_result_names(program, scope, outputs, false)
     }
 
@@ -47,9 +43,7 @@ impl StatementRoutine {
         let named = name_values(program, scope, outputs, &mut taken);
         let inside = inlined_values(program, &named, scope);
         let last = (!results_have_names).then_some(scope.sections.force_section());
-        let sections = scope
-            .sections
-            .value_sections(program, &inside, &named, last);
+        let sections = scope.sections.value_sections(program, &inside, &named, last);
         let turns_signs = sections.is_some();
         let sections = sections.unwrap_or_else(|| vec![0; program.ops.len()]);
         // Everything is then permuted to the order in which it is written.
@@ -66,10 +60,7 @@ impl StatementRoutine {
             by_state: Vec::new(),
             outputs: vec![false; order.len()],
             inside: order.iter().map(|i| inside[*i]).collect(),
-            named: named
-                .into_iter()
-                .map(|(i, name)| (place[i], name))
-                .collect(),
+            named: named.into_iter().map(|(i, name)| (place[i], name)).collect(),
             first: first.reorder(&order),
             values: vec![None; order.len()],
             next: [0; 2],
@@ -189,11 +180,7 @@ fn name_values(
 }
 
 /// Which values are written inside the only formula that uses them.
-fn inlined_values(
-    program: &StraightLineProgram,
-    named: &BTreeMap<usize, NamedValue>,
-    scope: &NameScope,
-) -> Vec<bool> {
+fn inlined_values(program: &StraightLineProgram, named: &BTreeMap<usize, NamedValue>, scope: &NameScope) -> Vec<bool> {
     let n = program.ops.len();
     let (uses, by_state) = count_uses(program);
     let mut inside = vec![false; n];
@@ -205,9 +192,7 @@ fn inlined_values(
             ProgramOp::Number(value) => value.to_f64().to_string().len(),
             ProgramOp::Input(atom) => scope.input_name(*atom).len(),
             ProgramOp::Neg(_) => 1,
-            ProgramOp::Unary(..) | ProgramOp::Sin(_) | ProgramOp::Cos(_) | ProgramOp::Atan2(..) => {
-                8
-            }
+            ProgramOp::Unary(..) | ProgramOp::Sin(_) | ProgramOp::Cos(_) | ProgramOp::Atan2(..) => 8,
             ProgramOp::Add(..) | ProgramOp::Sub(..) | ProgramOp::Mul(..) | ProgramOp::Div(..) => 3,
         };
         // Operands that are inlined here, for the case that the formula is too wide.
@@ -226,9 +211,7 @@ fn inlined_values(
             // Numbers and inputs are always written in place.
             if is_leaf(&program.ops[k]) {
                 total += width[k];
-            } else if (once || negation)
-                && !(by_state[k] && program.stages[k] == ProgramStage::Fixed)
-            {
+            } else if (once || negation) && !(by_state[k] && program.stages[k] == ProgramStage::Fixed) {
                 inside[k] = once;
                 total += width[k];
                 if once {
@@ -430,25 +413,13 @@ impl Builder<'_> {
         let value = match &op {
             ProgramOp::Number(value) => CodeExpression::number(value),
             ProgramOp::Input(atom) => self.scope.input_expression(*atom),
-            ProgramOp::Add(a, b) => {
-                CodeExpression::add(self.operand_expression(*a), self.operand_expression(*b))
-            }
-            ProgramOp::Sub(a, b) => {
-                CodeExpression::sub(self.operand_expression(*a), self.operand_expression(*b))
-            }
-            ProgramOp::Mul(a, b) => {
-                CodeExpression::mul(self.operand_expression(*a), self.operand_expression(*b))
-            }
-            ProgramOp::Div(a, b) => {
-                CodeExpression::div(self.operand_expression(*a), self.operand_expression(*b))
-            }
+            ProgramOp::Add(a, b) => CodeExpression::add(self.operand_expression(*a), self.operand_expression(*b)),
+            ProgramOp::Sub(a, b) => CodeExpression::sub(self.operand_expression(*a), self.operand_expression(*b)),
+            ProgramOp::Mul(a, b) => CodeExpression::mul(self.operand_expression(*a), self.operand_expression(*b)),
+            ProgramOp::Div(a, b) => CodeExpression::div(self.operand_expression(*a), self.operand_expression(*b)),
             ProgramOp::Neg(a) => CodeExpression::neg(self.operand_expression(*a)),
-            ProgramOp::Unary(function, a) => {
-                CodeExpression::call(*function, self.operand_expression(*a))
-            }
-            ProgramOp::Atan2(y, x) => {
-                CodeExpression::atan2(self.operand_expression(*y), self.operand_expression(*x))
-            }
+            ProgramOp::Unary(function, a) => CodeExpression::call(*function, self.operand_expression(*a)),
+            ProgramOp::Atan2(y, x) => CodeExpression::atan2(self.operand_expression(*y), self.operand_expression(*x)),
             // Sines and cosines are written in pairs.
             ProgramOp::Sin(a) => return self.write_sine(i, *a, statements),
             // A cosine without a sine is written here; otherwise the sine writes both.
@@ -472,17 +443,12 @@ impl Builder<'_> {
             }
         };
         // A value that is only an output is written in the statement that stores it.
-        let only_put = self.uses[i] == 1
-            && self.outputs[i]
-            && !self.named.contains_key(&i)
-            && !self.results_have_names;
+        let only_put = self.uses[i] == 1 && self.outputs[i] && !self.named.contains_key(&i) && !self.results_have_names;
         // Whether the value is written at its uses only.
         let unnamed = is_leaf(&op)
             || self.inside[i]
             || only_put && !self.is_precomputed(i)
-            || matches!(op, ProgramOp::Neg(_))
-                && !self.named.contains_key(&i)
-                && !self.is_precomputed(i);
+            || matches!(op, ProgramOp::Neg(_)) && !self.named.contains_key(&i) && !self.is_precomputed(i);
         if unnamed || (self.uses[i] == 0) {
             self.values[i] = Some(value);
             return;
@@ -493,11 +459,7 @@ impl Builder<'_> {
         let note = self.scope.value_note(&name);
         let written = CodeExpression::name(&name);
         statements.push(CodeStatement::Let { name, value, note });
-        self.values[i] = Some(if turned {
-            CodeExpression::neg(written)
-        } else {
-            written
-        });
+        self.values[i] = Some(if turned { CodeExpression::neg(written) } else { written });
     }
 
     /// Name and expression of a statement, and whether the value is minus the named expression. A sign that would be an
@@ -518,16 +480,9 @@ impl Builder<'_> {
             return (self.next_name(i), value, false);
         }
         // The expression of the named quantity.
-        let meant = if negative {
-            CodeExpression::neg(value)
-        } else {
-            value
-        };
+        let meant = if negative { CodeExpression::neg(value) } else { value };
         // Wrenches and Jacobians keep the sign of the equations.
-        let keeps = fixed
-            || ["F_", "M_", "J_"]
-                .iter()
-                .any(|start| name.starts_with(start));
+        let keeps = fixed || ["F_", "M_", "J_"].iter().any(|start| name.starts_with(start));
         // A sign that cannot be absorbed gives the value a generated name instead.
         match meant.normalize_sign() {
             // The name would stand for the negative.
@@ -568,11 +523,7 @@ impl Builder<'_> {
             terms += 1;
             parts.push(name.to_owned());
         });
-        let name = if terms > 3 {
-            "angle".to_owned()
-        } else {
-            parts.join("_")
-        };
+        let name = if terms > 3 { "angle".to_owned() } else { parts.join("_") };
         unique_name(&format!("{letter}_{name}"), &mut self.taken)
     }
 
@@ -630,9 +581,7 @@ impl Builder<'_> {
             PoseGuard::Reachable(v) => PoseCheck::Reachable(self.operand_expression(v)),
             // Only the magnitude is compared, so a sign is dropped.
             PoseGuard::Regular(v, size) => match self.operand_expression(v) {
-                CodeExpression::Neg(value) => {
-                    PoseCheck::Regular(*value, self.operand_expression(size))
-                }
+                CodeExpression::Neg(value) => PoseCheck::Regular(*value, self.operand_expression(size)),
                 value => PoseCheck::Regular(value, self.operand_expression(size)),
             },
             PoseGuard::Finite(v) => PoseCheck::Finite(self.operand_expression(v)),
@@ -641,10 +590,7 @@ impl Builder<'_> {
 }
 
 /// Removes named statements that nothing reads: all their uses may have been inlined with another sign.
-fn without_unread(
-    statements: Vec<CodeStatement>,
-    results: &[CodeExpression],
-) -> Vec<CodeStatement> {
+fn without_unread(statements: Vec<CodeStatement>, results: &[CodeExpression]) -> Vec<CodeStatement> {
     let mut read = BTreeSet::new();
     for result in results {
         result.for_each_name(&mut |name| {
@@ -687,10 +633,7 @@ fn without_empty(statements: Vec<CodeStatement>) -> Vec<CodeStatement> {
 ///
 /// Every `let` opens a scope inside the previous one. A compiler that writes nested debug scopes recursively runs out
 /// of stack with many thousands of them.
-pub(super) fn group_statements(
-    statements: Vec<CodeStatement>,
-    kept: &[String],
-) -> Vec<CodeStatement> {
+pub(super) fn group_statements(statements: Vec<CodeStatement>, kept: &[String]) -> Vec<CodeStatement> {
     // Short programs stay flat.
     if statements.len() <= LONG {
         return statements;

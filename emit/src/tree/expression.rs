@@ -57,10 +57,7 @@ impl CodeExpression {
             // Adding a negative is a subtraction.
             (a, Self::Neg(b)) => Self::sub(a, *b),
             (Self::Neg(a), b) => Self::sub(b, *a),
-            (a, b)
-                if b.precedence() == OperatorPrecedence::Sum
-                    && a.precedence() > OperatorPrecedence::Sum =>
-            {
+            (a, b) if b.precedence() == OperatorPrecedence::Sum && a.precedence() > OperatorPrecedence::Sum => {
                 Self::Add(Box::new(b), Box::new(a))
             }
             (a, b) => Self::Add(Box::new(a), Box::new(b)),
@@ -89,8 +86,7 @@ impl CodeExpression {
     /// A product without signs: numbers in front, nested products on the left.
     fn product(a: Self, b: Self) -> Self {
         // A product on the right would need parentheses.
-        let nested = b.precedence() == OperatorPrecedence::Product
-            && a.precedence() != OperatorPrecedence::Product;
+        let nested = b.precedence() == OperatorPrecedence::Product && a.precedence() != OperatorPrecedence::Product;
         let number = matches!(b, Self::Number(_)) && a.precedence() != OperatorPrecedence::Product;
         let (a, b) = if nested || number { (b, a) } else { (a, b) };
         Self::Mul(Box::new(a), Box::new(b))
@@ -166,9 +162,7 @@ impl CodeExpression {
             Self::Mul(..) | Self::Div(..) => OperatorPrecedence::Product,
             Self::Neg(_) => OperatorPrecedence::Negation,
             Self::Number(x) if x.is_sign_negative() => OperatorPrecedence::Negation,
-            Self::Number(_) | Self::Name(_) | Self::Call(..) | Self::Atan2(..) => {
-                OperatorPrecedence::Whole
-            }
+            Self::Number(_) | Self::Name(_) | Self::Call(..) | Self::Atan2(..) => OperatorPrecedence::Whole,
         }
     }
 
@@ -178,11 +172,7 @@ impl CodeExpression {
             Self::Number(_) => {}
             Self::Name(name) => visit(name),
             Self::Neg(a) | Self::Call(_, a) => a.for_each_name(visit),
-            Self::Add(a, b)
-            | Self::Sub(a, b)
-            | Self::Mul(a, b)
-            | Self::Div(a, b)
-            | Self::Atan2(a, b) => {
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) | Self::Atan2(a, b) => {
                 a.for_each_name(visit);
                 b.for_each_name(visit);
             }
@@ -195,11 +185,7 @@ impl CodeExpression {
             Self::Number(_) => {}
             Self::Name(name) => change(name),
             Self::Neg(a) | Self::Call(_, a) => a.rename(change),
-            Self::Add(a, b)
-            | Self::Sub(a, b)
-            | Self::Mul(a, b)
-            | Self::Div(a, b)
-            | Self::Atan2(a, b) => {
+            Self::Add(a, b) | Self::Sub(a, b) | Self::Mul(a, b) | Self::Div(a, b) | Self::Atan2(a, b) => {
                 a.rename(change);
                 b.rename(change);
             }
@@ -211,9 +197,7 @@ impl CodeExpression {
         let of = |f: &PrintedFormula| Self::from_formula(f, rename);
         match formula {
             PrintedFormula::Number(value) => Self::number(value),
-            PrintedFormula::Symbol(symbol) | PrintedFormula::Indexed(symbol, _) => {
-                Self::Name(rename(&symbol.text()))
-            }
+            PrintedFormula::Symbol(symbol) | PrintedFormula::Indexed(symbol, _) => Self::Name(rename(&symbol.text())),
             PrintedFormula::Sum(terms) => {
                 // The terms of a sum are added in order, with their signs as operators.
                 // The first term may be negative, all others are added or subtracted.
@@ -233,11 +217,7 @@ impl CodeExpression {
                 }
                 sum.unwrap_or(Self::Number(0.0))
             }
-            PrintedFormula::Term {
-                factor,
-                above,
-                below,
-            } => {
+            PrintedFormula::Term { factor, above, below } => {
                 // The sign is added at the end.
                 let magnitude = factor.abs();
                 // A term: factor times numerator over denominator.
@@ -245,9 +225,7 @@ impl CodeExpression {
                 let product = |factors: Vec<Self>| {
                     let mut factors = factors.into_iter();
                     let first = factors.next();
-                    first.map(|first| {
-                        factors.fold(first, |a, b| Self::Mul(Box::new(a), Box::new(b)))
-                    })
+                    first.map(|first| factors.fold(first, |a, b| Self::Mul(Box::new(a), Box::new(b))))
                 };
                 let above = product(number.into_iter().chain(above.iter().map(of)).collect());
                 // Numerator and denominator as products.
@@ -257,11 +235,7 @@ impl CodeExpression {
                     Some(below) => Self::div(above, below),
                     None => above,
                 };
-                if factor.is_negative() {
-                    Self::neg(value)
-                } else {
-                    value
-                }
+                if factor.is_negative() { Self::neg(value) } else { value }
             }
             PrintedFormula::Power(base, n) => {
                 // A power becomes repeated multiplication.

@@ -54,19 +54,14 @@ impl StatementRoutine {
     pub(crate) fn zero_outputs(&self) -> Vec<usize> {
         // Whether any statement stores output k.
         let is_put = |k: usize| {
-            self.has_statement(
-                &|statement| matches!(statement, CodeStatement::Put { output, .. } if *output == k),
-            )
+            self.has_statement(&|statement| matches!(statement, CodeStatement::Put { output, .. } if *output == k))
         };
         (0..self.n_outputs).filter(|k| !is_put(*k)).collect()
     }
 
     /// Whether any statement of a state satisfies `is_such`, inside groups too.
     fn has_statement(&self, is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
-        fn has_statement_in(
-            statements: &[CodeStatement],
-            is_such: &dyn Fn(&CodeStatement) -> bool,
-        ) -> bool {
+        fn has_statement_in(statements: &[CodeStatement], is_such: &dyn Fn(&CodeStatement) -> bool) -> bool {
             statements.iter().any(|statement| match statement {
                 CodeStatement::Group { statements, .. } => has_statement_in(statements, is_such),
                 statement => is_such(statement),
@@ -146,11 +141,7 @@ pub(crate) fn uses_load(derivation: &Derivation) -> bool {
     let programs = &derivation.programs;
     [&programs.regressor, &programs.inverse_dynamics]
         .iter()
-        .any(|p| {
-            p.ops
-                .iter()
-                .any(|op| matches!(op, ProgramOp::Input(Atom::Load(_))))
-        })
+        .any(|p| p.ops.iter().any(|op| matches!(op, ProgramOp::Input(Atom::Load(_)))))
 }
 
 /// Inputs of a program in order: positions, rates, accelerations, loads, then passive coordinates if they are solved
@@ -173,13 +164,11 @@ pub(crate) fn inputs_of_state(derivation: &Derivation, with_passive: bool) -> Ve
 /// Whether a program reads passive coordinates that Newton's method solves for.
 pub(crate) fn reads_passive(derivation: &Derivation, program: &StraightLineProgram) -> bool {
     let (_, passive) = derivation.coordinates();
-    matches!(
-        derivation.programs.passive_position,
-        PassivePosition::Newton(_)
-    ) && program
-        .ops
-        .iter()
-        .any(|op| matches!(op, ProgramOp::Input(Atom::Coordinate(i)) if passive.contains(i)))
+    matches!(derivation.programs.passive_position, PassivePosition::Newton(_))
+        && program
+            .ops
+            .iter()
+            .any(|op| matches!(op, ProgramOp::Input(Atom::Coordinate(i)) if passive.contains(i)))
 }
 
 /// Base parameters by eq. (16), expanded term by term.

@@ -46,9 +46,7 @@ impl PrecomputedValues {
                 CodeStatement::Let { name, value, note } => {
                     // A statement with the same value.
                     let known = self.statements.iter().find_map(|other| match other {
-                        CodeStatement::Let { name, value: v, .. } if *v == value => {
-                            Some(name.clone())
-                        }
+                        CodeStatement::Let { name, value: v, .. } if *v == value => Some(name.clone()),
                         _ => None,
                     });
                     let new = known.unwrap_or_else(|| {

@@ -43,12 +43,7 @@ struct SchedulerStatement {
 ///
 /// `fused` marks operations that are written inside another one, and `sections` is the section of each operation.
 /// Operations of an earlier section come first.
-pub(crate) fn order(
-    program: &StraightLineProgram,
-    fused: &[bool],
-    first: &[bool],
-    sections: &[usize],
-) -> Vec<usize> {
+pub(crate) fn order(program: &StraightLineProgram, fused: &[bool], first: &[bool], sections: &[usize]) -> Vec<usize> {
     // Fixed operations and those in `first` keep their order.
     let of_state = |i: &usize| program.stages[*i] == ProgramStage::State;
     // Operations that keep their place at the beginning.
@@ -133,14 +128,9 @@ fn statements(
         let longest = |users: &[usize]| users.iter().map(|u| statements[*u].height).max();
         let after = longest(&statements[k].users).unwrap_or(0);
         // Sum of the latencies of its operations.
-        let own = statements[k]
-            .ops
-            .iter()
-            .map(|i| latency_cycles(&program.ops[*i]));
+        let own = statements[k].ops.iter().map(|i| latency_cycles(&program.ops[*i]));
         // The operations of a formula form a tree, of which about half lies on the longest path.
-        let own = own
-            .sum::<usize>()
-            .div_ceil(statements[k].ops.len().clamp(1, 2));
+        let own = own.sum::<usize>().div_ceil(statements[k].ops.len().clamp(1, 2));
         statements[k].height = after + own;
     }
     statements
@@ -176,23 +166,13 @@ fn schedule_statements(statements: &[SchedulerStatement]) -> Vec<usize> {
             let statement = &statements[k];
             let last = statement.needs.iter().filter(|need| waiting[**need] == 1);
             let freed: usize = last.map(|need| statements[*need].values).sum();
-            i64::try_from(statement.values).unwrap_or(i64::MAX)
-                - i64::try_from(freed).unwrap_or(i64::MAX)
+            i64::try_from(statement.values).unwrap_or(i64::MAX) - i64::try_from(freed).unwrap_or(i64::MAX)
         };
         // Among the ready statements: first by section, then by live values if there are many, then by height.
         let best = (0..ready.len()).min_by_key(|place| {
             let k = ready[*place];
-            let pressure = if live < MOST_WAITING_VALUES {
-                0
-            } else {
-                kept(k)
-            };
-            (
-                statements[k].section,
-                pressure,
-                Reverse(statements[k].height),
-                k,
-            )
+            let pressure = if live < MOST_WAITING_VALUES { 0 } else { kept(k) };
+            (statements[k].section, pressure, Reverse(statements[k].height), k)
         });
         // Everything is written.
         let Some(best) = best else {

@@ -6,9 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use modelmill_codegen::expr::Atom;
-use modelmill_codegen::{
-    Derivation, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId,
-};
+use modelmill_codegen::{Derivation, PoseGuard, ProgramOp, ProgramStage, StraightLineProgram, ValueId};
 use rustc_hash::FxHashMap;
 
 use super::scope::NameScope;
@@ -58,8 +56,7 @@ impl SharedPose {
         let plain = programs.map(pose_dependent_values);
         // The longest beginning that the guards of the first program share with those of all other programs that share
         // any.
-        let common =
-            |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
+        let common = |a: &[PoseGuard], b: &[PoseGuard]| a.iter().zip(b).take_while(|(a, b)| a == b).count();
         let (_, _, first) = &numbered[0];
         let others = numbered[1..].iter();
         let shared = others.map(|(_, _, guards)| common(first, guards));
@@ -104,9 +101,7 @@ impl SharedPose {
             read.extend(own[n..].iter().flat_map(|guard| guard.values()));
         }
         read.retain(shared);
-        let parts = clients
-            .iter()
-            .map(|k| (numbered[*k].0, &numbered[*k].1, &plain[*k]));
+        let parts = clients.iter().map(|k| (numbered[*k].0, &numbered[*k].1, &plain[*k]));
         // The shared part as a program of its own, and its statements.
         let (program, places) = shared_program(parts, &shared, &guards, &read);
         // Every result gets a name, because programs bind results by name.
@@ -121,9 +116,7 @@ impl SharedPose {
         }
         // Constants are read from the geometry; only coordinates are arguments.
         let inputs = routine.read.iter().copied();
-        let inputs = inputs
-            .filter(|atom| matches!(atom, Atom::Coordinate(_)))
-            .collect();
+        let inputs = inputs.filter(|atom| matches!(atom, Atom::Coordinate(_))).collect();
         Some(Self {
             numbers,
             read: places,
@@ -136,10 +129,7 @@ impl SharedPose {
 
     /// The program without the shared part, whose results become inputs. `None` if the program does not begin with the
     /// same guards.
-    pub(crate) fn remaining_program(
-        &self,
-        program: &StraightLineProgram,
-    ) -> Option<StraightLineProgram> {
+    pub(crate) fn remaining_program(&self, program: &StraightLineProgram) -> Option<StraightLineProgram> {
         let mut numbers = self.numbers.clone();
         let values = numbers_of(program, &mut numbers);
         let guards: Vec<PoseGuard> = program
@@ -175,10 +165,7 @@ fn renumber_guard(guard: PoseGuard, values: &[ValueId]) -> PoseGuard {
 
 /// The value number of each operation of a program; new operations are added to `numbers`. Sums and products are
 /// commutative.
-fn numbers_of(
-    program: &StraightLineProgram,
-    numbers: &mut FxHashMap<ProgramOp, ValueId>,
-) -> Vec<ValueId> {
+fn numbers_of(program: &StraightLineProgram, numbers: &mut FxHashMap<ProgramOp, ValueId>) -> Vec<ValueId> {
     let mut values: Vec<ValueId> = Vec::with_capacity(program.ops.len());
     for op in &program.ops {
         // The operation on numbered operands.
@@ -229,8 +216,7 @@ fn shared_program<'a>(
     for (part, values, plain) in parts {
         for (i, op) in part.ops.iter().enumerate() {
             // The negative of a shared value is kept, because another shared value may need it.
-            let of_known =
-                matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
+            let of_known = matches!(op, ProgramOp::Neg(v) if places.contains_key(&values[v.index()]));
             // Fixed values and leaves are added as well; those without a use are removed at the end.
             let fixed = part.stages[i] == ProgramStage::Fixed;
             let wanted = fixed || is_leaf(op) || of_known || shared(&values[i]);
@@ -258,9 +244,6 @@ fn shared_program<'a>(
         })
         .collect();
     program.outputs = outputs.iter().map(|(place, _)| *place).collect();
-    let places = outputs
-        .iter()
-        .enumerate()
-        .map(|(k, (_, value))| (*value, k));
+    let places = outputs.iter().enumerate().map(|(k, (_, value))| (*value, k));
     (program.without_dead_code(), places.collect())
 }

@@ -166,10 +166,7 @@ impl NameScope {
     pub(super) fn is_input(&self, name: &str) -> bool {
         self.atoms.iter().any(|(atom, other)| {
             // Inputs of the state only.
-            let of_state = matches!(
-                atom,
-                Atom::Coordinate(_) | Atom::Rate(_) | Atom::Acceleration(_)
-            );
+            let of_state = matches!(atom, Atom::Coordinate(_) | Atom::Rate(_) | Atom::Acceleration(_));
             of_state && other == name
         })
     }

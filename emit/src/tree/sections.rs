@@ -57,10 +57,7 @@ impl CodeSections {
             // First and last equation of the drive on the page.
             let first = tag + 1;
             tag += 1 + derivation.coordinates_that_move(d).len();
-            let along = sections.add(format!(
-                "Drive `{}`: eqs. (D{first}) to (D{tag}).",
-                drive.name
-            ));
+            let along = sections.add(format!("Drive `{}`: eqs. (D{first}) to (D{tag}).", drive.name));
             for point in [from, to] {
                 let point = &mechanism.points[point.0];
                 let frame = &mechanism.frames[point.frame.0].name;
@@ -70,9 +67,7 @@ impl CodeSections {
             }
             sections.assign_section("e", &drive.name, "", along);
             for suffix in ["", "_d"] {
-                sections
-                    .names
-                    .insert(format!("l_{}{suffix}", drive.name), along);
+                sections.names.insert(format!("l_{}{suffix}", drive.name), along);
             }
             for coordinate in &mechanism.coordinates {
                 let name = format!("J_{}_{}", drive.name, coordinate.name);
@@ -97,15 +92,9 @@ impl CodeSections {
             for name in ["", "c_", "s_"].map(|letter| format!("{letter}{}", coordinate.name)) {
                 sections.names.insert(name, closes);
             }
-            sections
-                .names
-                .insert(format!("{}_d", coordinate.name), rates);
-            sections
-                .names
-                .insert(format!("{}_d_sq", coordinate.name), rates);
-            sections
-                .names
-                .insert(format!("{}_dd", coordinate.name), accelerations);
+            sections.names.insert(format!("{}_d", coordinate.name), rates);
+            sections.names.insert(format!("{}_d_sq", coordinate.name), rates);
+            sections.names.insert(format!("{}_dd", coordinate.name), accelerations);
         }
         // From the last link to the base, the direction in which wrenches are summed.
         for frame in mechanism.frames.iter().rev() {
@@ -133,8 +122,7 @@ impl CodeSections {
     /// Assigns the three components of a vector to a section.
     fn assign_section(&mut self, letter: &str, of: &str, suffix: &str, section: usize) {
         for axis in AXES {
-            self.names
-                .insert(format!("{letter}_{of}_{axis}{suffix}"), section);
+            self.names.insert(format!("{letter}_{of}_{axis}{suffix}"), section);
         }
     }
 
@@ -189,10 +177,7 @@ impl CodeSections {
             });
         }
         // Forwards: a value cannot come before its operands.
-        let mut sections: Vec<usize> = sections
-            .into_iter()
-            .map(Option::unwrap_or_default)
-            .collect();
+        let mut sections: Vec<usize> = sections.into_iter().map(Option::unwrap_or_default).collect();
         for (i, op) in program.ops.iter().enumerate() {
             if matches!(op, ProgramOp::Number(_) | ProgramOp::Input(_)) || !moving(&i) {
                 sections[i] = 0;

@@ -13,20 +13,11 @@ use crate::language::{EmissionRequest, EmittedFile};
 /// Status codes in the order of their values: name in the header after the prefix, and meaning.
 pub(super) const STATUS: [(&str, &str); 9] = [
     ("OK", "no error"),
-    (
-        "OUT_OF_REACH",
-        "the loops cannot close: the pose is out of reach",
-    ),
+    ("OUT_OF_REACH", "the loops cannot close: the pose is out of reach"),
     ("SINGULAR", "the pose is singular"),
-    (
-        "UNDEFINED",
-        "a term of the model has no finite value at this state",
-    ),
+    ("UNDEFINED", "a term of the model has no finite value at this state"),
     ("NOT_FINITE", "an input is NaN, infinite, or above 1e60"),
-    (
-        "NOT_PREPARED",
-        "the structure was not filled by the function `prepare`",
-    ),
+    ("NOT_PREPARED", "the structure was not filled by the function `prepare`"),
     ("NULL_POINTER", "an argument is a null pointer"),
     ("LENGTH", "arrays of different lengths"),
     (
@@ -198,15 +189,21 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
     });
     // Forces and regressor of many states, which the runtime computes in vectors.
     let [forces_many, regressor_many] = [
-        (function("inverse_dynamics_many"), quote! {
-            prepared.dynamics.forces_of_many(&states, &mut unsafe { columns_mut::<#n_drives>(outputs, n) })
-        }),
-        (function("regressor_many"), quote! {
-            match unsafe { all_mut(outputs, n, #n_entries) } {
-                Some(outputs) => prepared.model.regressor_of_many(&states, outputs),
-                None => return LENGTH,
-            }
-        }),
+        (
+            function("inverse_dynamics_many"),
+            quote! {
+                prepared.dynamics.forces_of_many(&states, &mut unsafe { columns_mut::<#n_drives>(outputs, n) })
+            },
+        ),
+        (
+            function("regressor_many"),
+            quote! {
+                match unsafe { all_mut(outputs, n, #n_entries) } {
+                    Some(outputs) => prepared.model.regressor_of_many(&states, outputs),
+                    None => return LENGTH,
+                }
+            },
+        ),
     ]
     .map(|(name, call)| {
         quote! {
@@ -230,22 +227,10 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         }
     });
     // Names of the exported functions for preparation.
-    let [
-        default_geometry,
-        nominal_parameters,
-        base_parameters,
-        prepare,
-    ] = [
-        "default_geometry",
-        "nominal_parameters",
-        "base_parameters",
-        "prepare",
-    ]
-    .map(function);
+    let [default_geometry, nominal_parameters, base_parameters, prepare] =
+        ["default_geometry", "nominal_parameters", "base_parameters", "prepare"].map(function);
     // The equation of motion is prepared only if it is part of the module.
-    let equation_field = face
-        .dynamics
-        .map(|_| quote! { equation: model::Dynamics<f64>, });
+    let equation_field = face.dynamics.map(|_| quote! { equation: model::Dynamics<f64>, });
     let equation_init = face
         .dynamics
         .map(|_| quote! { equation: model::Dynamics::new(&geometry, base), });
@@ -433,24 +418,15 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
 
 /// The exported function of one state. With `near`, it takes the passive coordinates of a nearby pose and replaces
 /// them.
-fn single_state_function(
-    face: &LanguageBinding<'_>,
-    one: &WrappedFunction,
-    near: bool,
-) -> TokenStream {
+fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) -> TokenStream {
     // Names as in the emitted module.
     let suffix = if near { "_near" } else { "" };
     let name = format_ident!("{}_{}{suffix}", face.name, one.name);
     let dynamics = format_ident!("{}_dynamics", face.name);
-    let (owner, method) = (
-        format_ident!("{}", one.owner),
-        format_ident!("{}{suffix}", one.method),
-    );
+    let (owner, method) = (format_ident!("{}", one.owner), format_ident!("{}{suffix}", one.method));
     // Arguments: the state, forces if they are read, and passive coordinates.
     let state = face.state_parts();
-    let given = one
-        .takes_forces
-        .then(|| (format_ident!("forces"), face.n_drives()));
+    let given = one.takes_forces.then(|| (format_ident!("forces"), face.n_drives()));
     // Pointers with the lengths of their arrays.
     let inputs: Vec<_> = state.iter().chain(&given).collect();
     let (names, sizes): (Vec<_>, Vec<usize>) = inputs.iter().map(|(name, n)| (name, *n)).unzip();
@@ -477,14 +453,10 @@ fn single_state_function(
     let writes = one.parts.iter().map(|part| {
         let value = one.part_tokens(part);
         // The type of an array, with the innermost dimension last.
-        let kind = part
-            .shape
-            .iter()
-            .rev()
-            .fold(quote! { f64 }, |inner, count| {
-                let n = count.n;
-                quote! { [#inner; #n] }
-            });
+        let kind = part.shape.iter().rev().fold(quote! { f64 }, |inner, count| {
+            let n = count.n;
+            quote! { [#inner; #n] }
+        });
         // Offset of this array in the output.
         let place = at;
         at += part.n_entries();

@@ -70,9 +70,7 @@ pub(super) fn header(face: &LanguageBinding<'_>) -> String {
     // Names of positions, so that callers need not count.
     let (of_active, of_passive) = face.derivation.coordinates();
     let coordinates = |places: &[usize]| -> Vec<&str> {
-        let named = places
-            .iter()
-            .map(|i| mechanism.coordinates[*i].name.as_str());
+        let named = places.iter().map(|i| mechanism.coordinates[*i].name.as_str());
         named.collect()
     };
     // Names of the drives.
@@ -159,7 +157,9 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
     }
     // Solution for the passive coordinates only.
     if face.newton {
-        text.push_str("\n/* Passive coordinates of a pose; `_near`: from those of a nearby pose, which are replaced. */\n");
+        text.push_str(
+            "\n/* Passive coordinates of a pose; `_near`: from those of a nearby pose, which are replaced. */\n",
+        );
         for suffix in ["", "_near"] {
             _ = writeln!(
                 text,
@@ -169,13 +169,10 @@ int32_t {name}_prepare({name}_dynamics *dynamics, const double *geometry, const 
         }
     }
     // Functions of many states take one pointer per part of the state.
-    let states = face
-        .state_parts()
-        .iter()
-        .fold(String::new(), |mut s, (part, _)| {
-            _ = write!(s, "const double *{part}, ");
-            s
-        });
+    let states = face.state_parts().iter().fold(String::new(), |mut s, (part, _)| {
+        _ = write!(s, "const double *{part}, ");
+        s
+    });
     _ = writeln!(
         text,
         "
@@ -211,10 +208,7 @@ fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) ->
     }
     // The length of the result as a product or sum of named sizes.
     let sizes = one.parts.iter().map(|part| {
-        let counts = part
-            .shape
-            .iter()
-            .map(|count| format!("{upper}_N_{}", count.name));
+        let counts = part.shape.iter().map(|count| format!("{upper}_N_{}", count.name));
         counts.collect::<Vec<String>>().join(" * ")
     });
     let sizes = sizes.collect::<Vec<String>>().join(" + ");
@@ -229,9 +223,5 @@ fn declaration(face: &LanguageBinding<'_>, one: &WrappedFunction, near: bool) ->
     });
     // Names as in `c_abi`.
     let suffix = if near { "_near" } else { "" };
-    format!(
-        "int32_t {name}_{}{suffix}({});",
-        one.name,
-        arguments.join(", ")
-    )
+    format!("int32_t {name}_{}{suffix}({});", one.name, arguments.join(", "))
 }

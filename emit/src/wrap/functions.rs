@@ -76,10 +76,7 @@ impl ResultPart {
 }
 
 /// All functions of one state that a model has; those of the equation of motion only if it is requested.
-#[allow(
-    clippy::too_many_lines,
-    reason = "a list of functions, one after the other"
-)]
+#[allow(clippy::too_many_lines, reason = "a list of functions, one after the other")]
 pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFunction> {
     // Dimensions by the names that the C header gives them.
     let count = |name, n| ArrayDimension { name, n };
@@ -140,9 +137,7 @@ pub(super) fn wrapped_functions(face: &LanguageBinding<'_>) -> Vec<WrappedFuncti
             reads_accelerations: true,
             takes_forces: false,
             follows: follows(&programs.passive),
-            parts: ["q", "qd", "qdd"]
-                .map(|name| ResultPart::new(name, &[passive]))
-                .into(),
+            parts: ["q", "qd", "qdd"].map(|name| ResultPart::new(name, &[passive])).into(),
         });
     }
     // The functions below belong to the equation of motion.

@@ -53,10 +53,7 @@ impl<'a> LanguageBinding<'a> {
             dynamics: source.dynamics,
             name,
             load: uses_load(derivation),
-            newton: matches!(
-                derivation.programs.passive_position,
-                PassivePosition::Newton(_)
-            ),
+            newton: matches!(derivation.programs.passive_position, PassivePosition::Newton(_)),
         }
     }
 
@@ -101,9 +98,7 @@ impl<'a> LanguageBinding<'a> {
             parts.push(("load", self.n_drives()));
         }
         let parts = parts.into_iter();
-        parts
-            .map(|(name, n)| (format_ident!("{name}"), n))
-            .collect()
+        parts.map(|(name, n)| (format_ident!("{name}"), n)).collect()
     }
 
     /// The emitted module as a file, with the equation of motion if it is requested.
@@ -122,10 +117,7 @@ impl<'a> LanguageBinding<'a> {
     /// A function that converts an array to `Geometry` or `Parameters`, and one that returns the default values as an
     /// array.
     pub(super) fn record_functions(function: &str, record: &str, names: &[&str]) -> TokenStream {
-        let (from, to) = (
-            format_ident!("{function}"),
-            format_ident!("{function}_values"),
-        );
+        let (from, to) = (format_ident!("{function}"), format_ident!("{function}_values"));
         let record = format_ident!("{record}");
         let n = names.len();
         let fields: Vec<Ident> = names.iter().map(|name| field_identifier(name)).collect();

@@ -11,10 +11,9 @@ use crate::language::{EmissionRequest, EmittedFile};
 
 /// Names that a Python module cannot have: keywords, and `numpy`, which it would hide from its callers.
 const RESERVED: &[&str] = &[
-    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue",
-    "def", "del", "elif", "else", "except", "finally", "for", "from", "global", "if", "import",
-    "in", "is", "lambda", "nonlocal", "not", "numpy", "or", "pass", "raise", "return", "try",
-    "while", "with", "yield",
+    "False", "None", "True", "and", "as", "assert", "async", "await", "break", "class", "continue", "def", "del",
+    "elif", "else", "except", "finally", "for", "from", "global", "if", "import", "in", "is", "lambda", "nonlocal",
+    "not", "numpy", "or", "pass", "raise", "return", "try", "while", "with", "yield",
 ];
 
 /// The files of the crate, without reactions and self-test. The caller copies `modelmill-runtime` into the folder of
@@ -116,13 +115,12 @@ fn items(face: &LanguageBinding<'_>) -> TokenStream {
         .clone()
         .map(|one| format_ident!("{}", python_name(one)))
         .collect();
-    let singles: Vec<TokenStream> = singles
-        .map(|one| single_state_function(face, one))
-        .collect();
+    let singles: Vec<TokenStream> = singles.map(|one| single_state_function(face, one)).collect();
     // Documentation of the three functions that are written out.
     let doc_forces = "Forces of the drives, N or N m, for base parameters `p`. `parallel` uses all cores; `geometry` has the \
                       known quantities that differ from the model file, by name.";
-    let doc_regressor = "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
+    let doc_regressor =
+        "H_min: one row per drive, one column per base parameter. `parallel` and `geometry` as in `inverse_dynamics`.";
     let doc_base = "Base parameters from physical parameters; those that are not named have the model file's values.";
     quote! {
         #![allow(clippy::needless_pass_by_value, reason = "pyo3 passes arguments by value")]
@@ -364,22 +362,12 @@ fn arrays(parts: &[(Ident, usize)]) -> TokenStream {
 
 /// A function that is evaluated state by state.
 fn single_state_function(face: &LanguageBinding<'_>, one: &WrappedFunction) -> TokenStream {
-    let (name, method) = (
-        format_ident!("{}", python_name(one)),
-        format_ident!("{}", one.method),
-    );
+    let (name, method) = (format_ident!("{}", python_name(one)), format_ident!("{}", one.method));
     let state = face.state_parts();
     // Accelerations are no argument of a function that does not read them.
     let is_given = |part: &&(Ident, usize)| one.reads_accelerations || part.0 != "qdd";
-    let forces = one
-        .takes_forces
-        .then(|| (format_ident!("forces"), face.n_drives()));
-    let given: Vec<(Ident, usize)> = state
-        .iter()
-        .filter(is_given)
-        .chain(&forces)
-        .cloned()
-        .collect();
+    let forces = one.takes_forces.then(|| (format_ident!("forces"), face.n_drives()));
+    let given: Vec<(Ident, usize)> = state.iter().filter(is_given).chain(&forces).cloned().collect();
     // Names of the arguments.
     let names: Vec<_> = given.iter().map(|(name, _)| name).collect();
     let arrays = arrays(&given);

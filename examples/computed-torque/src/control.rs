@@ -58,11 +58,7 @@ impl<'a> TorqueController<'a> {
     ) -> Result<Self, PoseError> {
         // Everything is computed once, at the beginning of the task.
         let q = ReferenceMotion::task().state_at(0.0)[0];
-        let still = |qdd| spidermill::State {
-            q,
-            qd: [0.0; 2],
-            qdd,
-        };
+        let still = |qdd| spidermill::State { q, qd: [0.0; 2], qdd };
         let weight = dynamics.forces(&still([0.0; 2]))?;
         let jacobian = drives.drives(&still([0.0; 2]))?.jacobian;
         // Moments at the cranks for one rad/s^2 of each.
@@ -71,9 +67,7 @@ impl<'a> TorqueController<'a> {
             let mut qdd = [0.0; 2];
             qdd[k] = 1.0;
             let forces = dynamics.forces(&still(qdd))?;
-            inertia[k] = (0..2)
-                .map(|d| jacobian[d][k] * (forces[d] - weight[d]))
-                .sum();
+            inertia[k] = (0..2).map(|d| jacobian[d][k] * (forces[d] - weight[d])).sum();
         }
         Ok(Self(Box::new(move |now| {
             let state = spidermill::State {

@@ -13,9 +13,7 @@ const CUTOFF: f64 = 20.0;
 const ENDS: usize = 150;
 
 /// The base parameters with the least squared error of the forces.
-pub(crate) fn identify(
-    recording: &ControlRecording,
-) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
+pub(crate) fn identify(recording: &ControlRecording) -> Result<[f64; model::N_BASE], Box<dyn Error>> {
     // Positions are filtered and differentiated twice.
     let mut states = Vec::new();
     for q in &recording.q {
@@ -29,10 +27,9 @@ pub(crate) fn identify(
     let n = recording.t.len();
     let inner = ENDS..n - ENDS;
     // Forces are constant during a cycle, so they belong to its middle. There the motion is the mean of two samples.
-    let halfway =
-        |x: &[f64]| -> Vec<f64> { inner.clone().map(|i| 0.5 * (x[i] + x[i + 1])).collect() };
-    let [q, qd, qdd] = [0, 1, 2]
-        .map(|what| [0, 1].map(|k| halfway([&states[k].q, &states[k].qd, &states[k].qdd][what])));
+    let halfway = |x: &[f64]| -> Vec<f64> { inner.clone().map(|i| 0.5 * (x[i] + x[i + 1])).collect() };
+    let [q, qd, qdd] =
+        [0, 1, 2].map(|what| [0, 1].map(|k| halfway([&states[k].q, &states[k].qd, &states[k].qdd][what])));
     let states = model::States {
         q: q.each_ref().map(|x| &x[..]),
         qd: qd.each_ref().map(|x| &x[..]),

@@ -47,14 +47,10 @@ fn report(rig: &modelmill_rig::Rig, task: &ReferenceMotion) -> Result<Vec<String
     let recording = run(rig, &with, &ReferenceMotion::excitation())?;
     let base = identify(&recording)?;
     // The identified model also has friction.
-    let known = spidermill_with_friction::InverseDynamics::new(
-        &spidermill_with_friction::Geometry::default(),
-        &base,
-    );
+    let known = spidermill_with_friction::InverseDynamics::new(&spidermill_with_friction::Geometry::default(), &base);
     let identified = TorqueController::with_identified(&known);
 
-    let mut lines =
-        vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
+    let mut lines = vec!["root mean square of the tracking error, mrad        theta1    theta2".to_owned()];
     // All controllers follow the same task on the same plant.
     for (name, controller) in [
         ("without the model (constant gains per drive)", &without),

@@ -72,10 +72,7 @@ pub(crate) fn parameters_in_use() -> Result<[f64; model::N_BASE], Box<dyn Error>
         Fv_spindle_right: 150.0,
         ..Default::default()
     };
-    Ok(model::base_parameters(
-        &model::Geometry::default(),
-        &parameters,
-    )?)
+    Ok(model::base_parameters(&model::Geometry::default(), &parameters)?)
 }
 
 impl SimulatedMachine {
@@ -159,10 +156,7 @@ fn rig() -> Result<Rig, Box<dyn Error>> {
 /// Times of the samples of a period, s.
 pub(crate) fn times() -> impl Iterator<Item = f64> {
     let n = (PERIOD / CYCLE).round();
-    (0..)
-        .map(f64::from)
-        .take_while(move |i| *i < n)
-        .map(|i| i * CYCLE)
+    (0..).map(f64::from).take_while(move |i| *i < n).map(|i| i * CYCLE)
 }
 
 /// Forces of a rig's drives along a period, N.

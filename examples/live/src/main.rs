@@ -120,11 +120,7 @@ impl WatchSession {
                     if change.is_identified() && self.identified.len() < self.alarms.len() {
                         self.identified.push((t, change));
                     }
-                    if self
-                        .alarms
-                        .last()
-                        .is_some_and(|raised| t > raised + PATIENCE)
-                    {
+                    if self.alarms.last().is_some_and(|raised| t > raised + PATIENCE) {
                         self.watch.live.accept();
                         is_raised = false;
                     }
@@ -175,10 +171,7 @@ impl WatchSession {
 }
 
 /// A state and its forces for the watch; NaN stands for the force of a drive that hardly moves.
-fn sample(
-    model: &model::Model<f64>,
-    motion: &SmoothedState,
-) -> Result<(model::State<f64>, [f64; 2]), PoseError> {
+fn sample(model: &model::Model<f64>, motion: &SmoothedState) -> Result<(model::State<f64>, [f64; 2]), PoseError> {
     let state = model::State {
         q: motion.q,
         qd: motion.qd,

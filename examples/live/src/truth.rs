@@ -24,9 +24,7 @@ fn rows(right_rests: bool) -> Vec<SampleRows> {
         }
         model::State { q, qd, qdd }
     });
-    states
-        .map(|state| emitted.regressor(&state).unwrap())
-        .collect()
+    states.map(|state| emitted.regressor(&state).unwrap()).collect()
 }
 
 /// A watch of simulated forces with noise of 8 N: white, below 1 Hz, or a mixture.
@@ -79,8 +77,7 @@ impl WatchBench {
             let mut forces = [0.0; 2];
             for d in 0..2 {
                 let fresh = self.normal();
-                self.wandering[d] =
-                    stays * self.wandering[d] + (1.0 - stays * stays).sqrt() * self.normal();
+                self.wandering[d] = stays * self.wandering[d] + (1.0 - stays * stays).sqrt() * self.normal();
                 let noise = (1.0 - self.colour) * fresh + self.colour * self.wandering[d];
                 let terms = sample[d].iter().zip(&self.parameters);
                 forces[d] = terms.map(|(h, p)| h * p).sum::<f64>() + 8.0 * noise;
@@ -147,11 +144,7 @@ fn a_drive_that_is_never_measured_keeps_no_other_waiting() {
 #[test]
 fn what_rests_is_not_named_and_raises_nothing_as_it_begins_to_move() {
     let (resting, moving) = (rows(true), rows(false));
-    let of_right = |p: usize| {
-        model::BASE_PARAMETERS[p]
-            .expression
-            .ends_with("_spindle_right")
-    };
+    let of_right = |p: usize| model::BASE_PARAMETERS[p].expression.ends_with("_spindle_right");
     let mut bench = WatchBench::new(0.3, 2);
     assert!(bench.run_seconds(&resting, 120).is_empty());
     // Friction of the spindle at standstill has no effect.

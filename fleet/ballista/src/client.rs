@@ -60,9 +60,7 @@ pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) ->
     // The header stands before the first batch only.
     let mut header = true;
     for batch in batches.iter().filter(|batch| batch.num_rows() > 0) {
-        let mut writer = WriterBuilder::new()
-            .with_header(header)
-            .build(std::io::stdout());
+        let mut writer = WriterBuilder::new().with_header(header).build(std::io::stdout());
         writer.write(batch)?;
         header = false;
     }
@@ -102,8 +100,7 @@ async fn register_table(session: &SessionContext, table: &str) -> Result<()> {
     session.sql(&external).await?.collect().await?;
     // Partition columns have dictionary types, which shuffles between processes change to text; so they are cast to
     // text here.
-    let texts =
-        ["robot", "day", "recording"].map(|part| format!("arrow_cast({part}, 'Utf8') AS {part}"));
+    let texts = ["robot", "day", "recording"].map(|part| format!("arrow_cast({part}, 'Utf8') AS {part}"));
     let view = format!(
         "CREATE VIEW {name} AS SELECT * EXCEPT (robot, day, recording), {} FROM {name}_files",
         texts.join(", ")
@@ -120,10 +117,7 @@ fn flatten_structs(frame: DataFrame) -> Result<DataFrame> {
         let column = datafusion::prelude::Expr::Column((qualifier, field).into());
         if let DataType::Struct(fields) = field.data_type() {
             for inner in fields {
-                let of = datafusion::functions::core::expr_fn::get_field(
-                    column.clone(),
-                    inner.name().as_str(),
-                );
+                let of = datafusion::functions::core::expr_fn::get_field(column.clone(), inner.name().as_str());
                 columns.push(of.alias(inner.name()));
             }
         } else {
@@ -181,13 +175,9 @@ async fn was_executor_lost(url: &str, job_id: String) -> Result<bool> {
         .get_job_status(GetJobStatusParams { job_id })
         .await
         .map_err(|error| fault(&error))?;
-    Ok(
-        match told.into_inner().status.and_then(|told| told.status) {
-            Some(Status::Successful(_)) => true,
-            Some(Status::Failed(job)) => {
-                job.error == "Cancelled" || job.error.contains("most recent failure reason")
-            }
-            _ => false,
-        },
-    )
+    Ok(match told.into_inner().status.and_then(|told| told.status) {
+        Some(Status::Successful(_)) => true,
+        Some(Status::Failed(job)) => job.error == "Cancelled" || job.error.contains("most recent failure reason"),
+        _ => false,
+    })
 }

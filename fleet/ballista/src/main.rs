@@ -125,9 +125,7 @@ fn load_fleet_model(path: &Path) -> Result<Arc<Ground>, Fault> {
             path.display()
         ))
     })?;
-    Ok(Arc::new(
-        Plan::parse(&path.display().to_string(), &text)?.ground()?,
-    ))
+    Ok(Arc::new(Plan::parse(&path.display().to_string(), &text)?.ground()?))
 }
 
 /// Largest message between processes, bytes; it must have room for the samples of a recording.
@@ -137,11 +135,7 @@ pub(crate) const LONGEST_MESSAGE: u32 = 256 << 20;
 async fn run(cli: BallistaCli) -> Result<(), Fault> {
     let ground = load_fleet_model(&cli.plan)?;
     match cli.command {
-        BallistaCommand::Scheduler {
-            host,
-            port,
-            timeout,
-        } => scheduler::serve(&ground, &host, port, timeout).await,
+        BallistaCommand::Scheduler { host, port, timeout } => scheduler::serve(&ground, &host, port, timeout).await,
         BallistaCommand::Executor {
             host,
             port,
@@ -186,9 +180,7 @@ async fn run(cli: BallistaCli) -> Result<(), Fault> {
                 override_runtime_producer: Some(Arc::new(runtime)),
                 ..usual
             };
-            start_executor_process(Arc::new(config))
-                .await
-                .map_err(Fault::new)
+            start_executor_process(Arc::new(config)).await.map_err(Fault::new)
         }
         BallistaCommand::Query {
             sql,

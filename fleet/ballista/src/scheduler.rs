@@ -36,12 +36,7 @@ use crate::{LONGEST_MESSAGE, stores};
 /// Serves until the process ends. Executors without a message for `timeout` seconds count as lost.
 ///
 /// Fails if it cannot listen on the address.
-pub(crate) async fn serve(
-    ground: &Arc<Ground>,
-    host: &str,
-    port: u16,
-    timeout: u64,
-) -> std::result::Result<(), Fault> {
+pub(crate) async fn serve(ground: &Arc<Ground>, host: &str, port: u16, timeout: u64) -> std::result::Result<(), Fault> {
     let functions = ground.clone();
     // Sessions of the scheduler know the functions of the fleet.
     let session = move |config: SessionConfig| {
@@ -87,13 +82,9 @@ pub(crate) async fn serve(
         jobs: jobs.clone(),
         address,
     };
-    start_server(
-        BallistaCluster::new(Arc::new(cluster), jobs),
-        address,
-        Arc::new(config),
-    )
-    .await
-    .map_err(Fault::new)
+    start_server(BallistaCluster::new(Arc::new(cluster), jobs), address, Arc::new(config))
+        .await
+        .map_err(Fault::new)
 }
 
 /// Ballista's state of the executors, extended: the loss of an executor cancels all running jobs.
@@ -143,9 +134,7 @@ impl ClusterState for ExecutorCluster {
     async fn remove_executor(&self, executor_id: &str) -> Result<()> {
         match self.end_jobs().await {
             Ok(ended) => {
-                log::warn!(
-                    "executor {executor_id} is lost; {ended} jobs are cancelled, and clients send them again"
-                );
+                log::warn!("executor {executor_id} is lost; {ended} jobs are cancelled, and clients send them again");
             }
             // Without cancelling, a result could be wrong; it is better to give none.
             Err(fault) => {
@@ -177,11 +166,7 @@ impl ClusterState for ExecutorCluster {
         self.known.unbind_tasks(executor_slots).await
     }
 
-    async fn register_executor(
-        &self,
-        metadata: ExecutorMetadata,
-        spec: ExecutorData,
-    ) -> Result<()> {
+    async fn register_executor(&self, metadata: ExecutorMetadata, spec: ExecutorData) -> Result<()> {
         self.known.register_executor(metadata, spec).await
     }
 

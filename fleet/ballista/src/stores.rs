@@ -13,8 +13,7 @@ use url::Url;
 /// The environment of a process: stores by URL, and a folder for data that do not fit into memory (that of the system
 /// if not given).
 pub(crate) fn runtime_environment(spilled: Option<&Path>) -> Result<Arc<RuntimeEnv>> {
-    let runtime =
-        RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
+    let runtime = RuntimeEnvBuilder::new().with_object_store_registry(Arc::new(ObjectStores::default()));
     match spilled {
         Some(folder) => runtime.with_temp_file_path(folder).build_arc(),
         None => runtime.build_arc(),
@@ -30,11 +29,7 @@ struct ObjectStores {
 }
 
 impl ObjectStoreRegistry for ObjectStores {
-    fn register_store(
-        &self,
-        url: &Url,
-        store: Arc<dyn ObjectStore>,
-    ) -> Option<Arc<dyn ObjectStore>> {
+    fn register_store(&self, url: &Url, store: Arc<dyn ObjectStore>) -> Option<Arc<dyn ObjectStore>> {
         self.known.register_store(url, store)
     }
 

@@ -12,11 +12,7 @@ impl Log for WarningLogger {
 
     fn log(&self, record: &Record<'_>) {
         if self.enabled(record.metadata()) {
-            eprintln!(
-                "{}: {}",
-                record.level().as_str().to_lowercase(),
-                record.args()
-            );
+            eprintln!("{}: {}", record.level().as_str().to_lowercase(), record.args());
         }
     }
 

@@ -124,11 +124,7 @@ fn walk(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), FleetFault> {
 /// Robot and day of a path: from `robot=` and `day=`, else from the first and the second folder, or from the date at
 /// the start of the file name.
 fn robot_and_day(parts: &[String]) -> Option<(String, String)> {
-    let named = |key: &str| {
-        parts
-            .iter()
-            .find_map(|part| part.strip_prefix(key).map(str::to_owned))
-    };
+    let named = |key: &str| parts.iter().find_map(|part| part.strip_prefix(key).map(str::to_owned));
     if let (Some(robot), Some(day)) = (named("robot="), named("day=")) {
         return Some((robot, day));
     }

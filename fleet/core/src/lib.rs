@@ -15,8 +15,8 @@
 
 mod bytes;
 mod files;
+mod fleet_model;
 pub mod folder;
-mod ground;
 mod onset;
 pub mod outliers;
 mod plan;
@@ -26,7 +26,7 @@ mod summary;
 
 use modelmill::print::Message;
 
-pub use ground::{FleetFit, FleetModel};
+pub use fleet_model::{FleetFit, FleetModel};
 pub use modelmill::runs::FittedValue;
 pub use plan::{FleetPlan, FleetReference};
 pub use sensors::{FrozenReading, SensorFault};

@@ -51,10 +51,7 @@ pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<Change
     for at in MINIMUM_DAYS..=known.len() - MINIMUM_DAYS {
         let day = known[at].0;
         let step = fit(&known, |k| f64::from(u8::from(k >= day)));
-        let ramp = fit(
-            &known,
-            |k| if k >= day { (k - day + 1) as f64 } else { 0.0 },
-        );
+        let ramp = fit(&known, |k| if k >= day { (k - day + 1) as f64 } else { 0.0 });
         let tried = [(step, false, 0.0), (ramp, true, RAMP_PREFERENCE)];
         for (found, is_ramp, price) in tried {
             let Some((left, slope)) = found else { continue };
@@ -65,8 +62,7 @@ pub(crate) fn clearest_onset(values: &[Option<UncertainValue>]) -> Option<Change
             }
         }
     }
-    best.map(|(_, onset)| onset)
-        .filter(|onset| onset.gain > MINIMUM_GAIN)
+    best.map(|(_, onset)| onset).filter(|onset| onset.gain > MINIMUM_GAIN)
 }
 
 /// Weighted least squares fit of a level and a multiple of `shape`. Returns the weighted sum of squared residuals, and
@@ -89,9 +85,9 @@ fn fit(known: &[(usize, UncertainValue)], shape: impl Fn(usize) -> f64) -> Optio
         0.0
     };
     let level = (x - slope * s) / w;
-    let left = known.iter().map(|(k, (value, deviation))| {
-        ((value - origin - level - slope * shape(*k)) / deviation).powi(2)
-    });
+    let left = known
+        .iter()
+        .map(|(k, (value, deviation))| ((value - origin - level - slope * shape(*k)) / deviation).powi(2));
     Some((left.sum(), slope))
 }
 
@@ -110,16 +106,11 @@ mod tests {
     fn steps_and_ramps_are_told_apart_with_their_day() {
         // So steep that no two days are alike.
         for slope in [8.0, 300.0] {
-            let found =
-                clearest_onset(&series(&|k| slope * (k as f64 - 3.0).max(0.0))).expect("an onset");
+            let found = clearest_onset(&series(&|k| slope * (k as f64 - 3.0).max(0.0))).expect("an onset");
             assert_eq!(found.day, 4);
-            assert!(
-                (found.per_day.expect("a ramp") - slope).abs() < 0.3,
-                "{found:?}"
-            );
+            assert!((found.per_day.expect("a ramp") - slope).abs() < 0.3, "{found:?}");
         }
-        let found =
-            clearest_onset(&series(&|k| if k >= 6 { 12.0 } else { 0.0 })).expect("an onset");
+        let found = clearest_onset(&series(&|k| if k >= 6 { 12.0 } else { 0.0 })).expect("an onset");
         assert_eq!((found.day, found.per_day), (6, None));
     }
 

@@ -84,13 +84,8 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         })
         .collect();
     // Similar robots serve as reference: none of their parameters is far from the median.
-    let is_alike = |k: &usize| {
-        fits[*k].is_some()
-            && apart[*k]
-                .iter()
-                .flatten()
-                .all(|apart| apart.abs() < SIMILARITY_LIMIT)
-    };
+    let is_alike =
+        |k: &usize| fits[*k].is_some() && apart[*k].iter().flatten().all(|apart| apart.abs() < SIMILARITY_LIMIT);
     let alike: Vec<usize> = (0..robots.len()).filter(is_alike).collect();
     let mut found = Vec::new();
     if alike.len() >= PARTS {
@@ -114,8 +109,7 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
         let bounds: Vec<(f64, f64)> = (0..possible)
             .map(|g| {
                 let of_all = robust_centre(roots.iter().map(|roots| roots[g]).collect());
-                let (median, spread) =
-                    of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
+                let (median, spread) = of_all.map_or((0.0, 0.0), |all| (all.value, all.deviation.unwrap_or(0.0)));
                 (median, (spread / 1.4826).max(1.0))
             })
             .collect();
@@ -124,16 +118,14 @@ pub fn outliers(ground: &FleetModel, robots: &[RobotSummary]) -> Result<FleetOut
             let clearest = (0..possible).map(beyond).fold(0.0, f64::max);
             // A change in which robots hardly differ, such as the zero of a sensor, is significant even if it explains
             // only little of the difference. So the change that explains most gives the name.
-            let clear =
-                |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
+            let clear = |g: &usize| beyond(*g) > OUTLIER_LIMIT && beyond(*g) > ASSOCIATED_SHARE * clearest;
             let named = (0..possible)
                 .filter(clear)
                 .max_by(|a, b| roots[*a].total_cmp(&roots[*b]));
             if let Some(g) = named {
-                let mut change =
-                    ground
-                        .common
-                        .single_change(&parts, &robots[*which].summary.all_columns, g);
+                let mut change = ground
+                    .common
+                    .single_change(&parts, &robots[*which].summary.all_columns, g);
                 let rivals = (0..possible).filter(|other| *other != g && clear(other));
                 let rivals = rivals.map(|other| ground.common.name_of_change(other));
                 change.rivals = rivals.collect();

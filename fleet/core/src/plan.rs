@@ -5,9 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use modelmill::files::{DiskFiles, MemoryFiles};
-use modelmill::recording::{
-    PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation,
-};
+use modelmill::recording::{PreparedRecording, RecordingOptions, SmoothingMethod, StatePreparation};
 use modelmill::runs::ReferenceFit;
 use modelmill::{Host, Model};
 use modelmill_identify::changes::NormalEquations;
@@ -122,11 +120,7 @@ impl FleetPlan {
     /// names the others.
     ///
     /// Fails if the model has faults, or none of the recordings can be read and evaluated.
-    pub fn from_recordings(
-        model: &Path,
-        reading: &RecordingOptions,
-        reference: &[&Path],
-    ) -> Result<Self, FleetFault> {
+    pub fn from_recordings(model: &Path, reading: &RecordingOptions, reference: &[&Path]) -> Result<Self, FleetFault> {
         // The model with its files, so that the plan needs no other file.
         let host = Host::new();
         let derived = host.model(model)?;
@@ -135,9 +129,7 @@ impl FleetPlan {
             .map(|file| (file.path.display().to_string(), file.text.clone()))
             .collect();
         let path = model.display().to_string();
-        let mut last = FleetFault::new(
-            "there is no reference recording; give one or more of faultless machines",
-        );
+        let mut last = FleetFault::new("there is no reference recording; give one or more of faultless machines");
         // The first recording that can be read determines the preparation.
         let mut readable = reference.iter().filter_map(|path| {
             let read = derived.recording(path, reading);
@@ -172,11 +164,7 @@ impl FleetPlan {
         plan.reference = FleetReference {
             recordings: recordings.iter().map(|one| one.file().to_owned()).collect(),
             values: ground.values().to_vec(),
-            sizes: ground
-                .sizes()
-                .iter()
-                .map(ReferenceSums::from_moments)
-                .collect(),
+            sizes: ground.sizes().iter().map(ReferenceSums::from_moments).collect(),
             still: standstill_shares(&derived, &recordings),
         };
         Ok(plan)
@@ -241,12 +229,7 @@ impl FleetPlan {
         }
         let host = Host::new().with_files(Arc::new(files));
         let model = host.model(&self.model)?;
-        let sizes: Option<Vec<NormalEquations>> = self
-            .reference
-            .sizes
-            .iter()
-            .map(ReferenceSums::moments)
-            .collect();
+        let sizes: Option<Vec<NormalEquations>> = self.reference.sizes.iter().map(ReferenceSums::moments).collect();
         let sizes = sizes.ok_or_else(|| {
             FleetFault::new("the reference of the plan is inconsistent: its sums lack products; make the plan again with `modelmill-fleet plan`")
         })?;
@@ -263,14 +246,11 @@ const DECIMATION_RATIO: f64 = 8.0;
 /// A preparation with all values fixed: cut-off and decimation of the first recording, with a filter that can be
 /// applied to all. If a Fourier series is best for the first recording, others need not be periodic; then a low-pass
 /// well above its highest harmonic is used instead.
-fn fixed_preparation(
-    chosen: &PreparedRecording,
-    reading: &RecordingOptions,
-) -> Result<StatePreparation, FleetFault> {
+fn fixed_preparation(chosen: &PreparedRecording, reading: &RecordingOptions) -> Result<StatePreparation, FleetFault> {
     let run = chosen
         .segments
         .first()
-        .map(|stretch| &stretch.run)
+        .map(|segment| &segment.run)
         .ok_or_else(|| FleetFault::new(format!("{} has no samples", chosen.file())))?;
     // Values that are specified have priority over those of the first recording.
     let (prepared, asked) = (&run.prepared, &reading.preparation);
@@ -288,11 +268,7 @@ fn fixed_preparation(
         let every = (1..=1_000_000)
             .take_while(|every| DECIMATION_RATIO * cutoff * f64::from(*every) <= rate)
             .last();
-        decimate = decimate.max(
-            every
-                .and_then(|every: u32| usize::try_from(every).ok())
-                .unwrap_or(1),
-        );
+        decimate = decimate.max(every.and_then(|every: u32| usize::try_from(every).ok()).unwrap_or(1));
         cutoff_hz = Some(cutoff);
     }
     Ok(StatePreparation {
@@ -312,10 +288,7 @@ fn standstill_shares(model: &Model, recordings: &[PreparedRecording]) -> Vec<(St
     let names = model.active_coordinates().into_iter().chain(model.drives());
     names
         .map(|name| {
-            let of = |one: &PreparedRecording| {
-                one.raw_column(&name)
-                    .map_or(0.0, FrozenReading::longest_share)
-            };
+            let of = |one: &PreparedRecording| one.raw_column(&name).map_or(0.0, FrozenReading::longest_share);
             let most = recordings.iter().map(of).fold(0.0, f64::max);
             (name, most)
         })

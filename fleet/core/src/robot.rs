@@ -89,19 +89,13 @@ pub fn robot_history(
         })
         .collect();
     // Days without a usable recording are left out of the search for changes.
-    let known: Vec<usize> = (0..days.len())
-        .filter(|k| looked_at[*k].fit.is_some())
-        .collect();
+    let known: Vec<usize> = (0..days.len()).filter(|k| looked_at[*k].fit.is_some()).collect();
     let runs: Vec<DayRun> = known
         .iter()
         .filter_map(|k| {
             let fit = looked_at[*k].fit.as_ref()?;
             let summary = &days[*k].1;
-            Some((
-                fit.parameters.clone(),
-                summary.all_columns.clone(),
-                summary.within,
-            ))
+            Some((fit.parameters.clone(), summary.all_columns.clone(), summary.within))
         })
         .collect();
     let since = robot_changes(ground, &runs, &known);
@@ -166,9 +160,7 @@ fn clearest_change(ground: &FleetModel, runs: &[DayRun], within: f64) -> Option<
     let parameters = runs.first()?.0.len();
     let onsets = (0..parameters).filter_map(|k| Some((k, clearest_onset(&series(k))?)));
     let (_, found) = onsets.max_by(|a, b| a.1.gain.total_cmp(&b.1.gain))?;
-    let sums = |some: &[DayRun]| -> Vec<NormalEquations> {
-        some.iter().map(|run| run.1.clone()).collect()
-    };
+    let sums = |some: &[DayRun]| -> Vec<NormalEquations> { some.iter().map(|run| run.1.clone()).collect() };
     // Physical changes that explain the difference between the days before and since.
     let (before, later) = runs.split_at(found.day);
     let changes = ground.common.changes(&sums(before), &sums(later), within);

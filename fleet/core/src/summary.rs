@@ -88,11 +88,7 @@ impl FleetSummary {
         self.seconds += other.seconds;
         self.all_columns.merge(&other.all_columns);
         self.within = self.within.max(other.within);
-        for (mine, theirs) in self
-            .residual_squares
-            .iter_mut()
-            .zip(&other.residual_squares)
-        {
+        for (mine, theirs) in self.residual_squares.iter_mut().zip(&other.residual_squares) {
             *mine += theirs;
         }
         // Sorted lists do not depend on the order of additions.

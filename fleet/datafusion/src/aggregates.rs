@@ -4,16 +4,12 @@ use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
-use datafusion::arrow::array::{
-    Array, ArrayRef, BinaryArray, Float64Array, StructArray, UInt64Array,
-};
+use datafusion::arrow::array::{Array, ArrayRef, BinaryArray, Float64Array, StructArray, UInt64Array};
 use datafusion::arrow::compute::cast;
 use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields};
 use datafusion::common::{Result, ScalarValue, exec_err};
 use datafusion::logical_expr::function::{AccumulatorArgs, StateFieldsArgs};
-use datafusion::logical_expr::{
-    Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility,
-};
+use datafusion::logical_expr::{Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility};
 use modelmill_fleet::{Ground, Summary};
 
 use crate::samples::{GroupSamples, external_error};
@@ -80,8 +76,7 @@ impl FleetAggregate {
         let counts = ["recordings", "bad"].map(|name| Field::new(name, DataType::UInt64, true));
         let parameters = self.ground.parameters();
         let parameters = parameters.iter().flat_map(|info| {
-            [info.name.clone(), format!("{}_std", info.name)]
-                .map(|name| Field::new(name, DataType::Float64, true))
+            [info.name.clone(), format!("{}_std", info.name)].map(|name| Field::new(name, DataType::Float64, true))
         });
         counts.into_iter().chain(parameters).collect()
     }
@@ -197,10 +192,7 @@ impl SummaryAccumulator {
     fn finish_sum(&mut self) -> Result<Option<Summary>> {
         if self.of_samples {
             let fleet = self.fleet.clone();
-            return self
-                .samples
-                .summary(&fleet.ground, &fleet.columns)
-                .map(Some);
+            return self.samples.summary(&fleet.ground, &fleet.columns).map(Some);
         }
         Ok(self.sum.take())
     }
@@ -241,9 +233,7 @@ impl Accumulator for SummaryAccumulator {
     fn evaluate(&mut self) -> Result<ScalarValue> {
         let sum = self.finish_sum()?;
         match self.fleet.answer {
-            AggregateKind::Summary | AggregateKind::Merged => {
-                Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes())))
-            }
+            AggregateKind::Summary | AggregateKind::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
             AggregateKind::Parameters => {
                 let sum = sum.unwrap_or_else(|| self.fleet.ground.empty());
                 // A group without a usable recording has counts and no parameters.
@@ -256,9 +246,7 @@ impl Accumulator for SummaryAccumulator {
                 for k in 0..n {
                     // Value and standard deviation; both are null if not determined.
                     let fitted = fit.as_ref().map(|fit| fit.parameters[k]);
-                    columns.push(Arc::new(Float64Array::from(vec![
-                        fitted.map(|fitted| fitted.value),
-                    ])));
+                    columns.push(Arc::new(Float64Array::from(vec![fitted.map(|fitted| fitted.value)])));
                     columns.push(Arc::new(Float64Array::from(vec![
                         fitted.and_then(|fitted| fitted.deviation),
                     ])));

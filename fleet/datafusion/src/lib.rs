@@ -33,19 +33,10 @@ pub use recordings::RecordingsFunction;
 
 /// All aggregates over a plan, for the function registries of schedulers and executors.
 pub fn aggregates(ground: &Arc<Ground>) -> Vec<Arc<AggregateUDF>> {
-    [
-        AggregateKind::Summary,
-        AggregateKind::Merged,
-        AggregateKind::Parameters,
-    ]
-    .into_iter()
-    .map(|answer| {
-        Arc::new(AggregateUDF::from(FleetAggregate::new(
-            ground.clone(),
-            answer,
-        )))
-    })
-    .collect()
+    [AggregateKind::Summary, AggregateKind::Merged, AggregateKind::Parameters]
+        .into_iter()
+        .map(|answer| Arc::new(AggregateUDF::from(FleetAggregate::new(ground.clone(), answer))))
+        .collect()
 }
 
 /// Registers all functions over a plan with a session.

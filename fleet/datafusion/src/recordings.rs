@@ -48,9 +48,7 @@ impl std::fmt::Debug for RecordingsFunction {
 impl TableFunctionImpl for RecordingsFunction {
     /// The table of a folder; its files are not listed yet.
     fn call_with_args(&self, args: TableFunctionArgs<'_, '_>) -> Result<Arc<dyn TableProvider>> {
-        let [
-            Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _),
-        ] = args.exprs()
+        let [Expr::Literal(ScalarValue::Utf8(Some(folder)) | ScalarValue::Utf8View(Some(folder)), _)] = args.exprs()
         else {
             return plan_err!(
                 "modelmill_recordings needs one text argument: the folder that contains those of the robots"
@@ -80,15 +78,9 @@ enum RecordingsFolder {
 
 impl RecordingsFolder {
     /// The source of the files, and all recordings with their robots.
-    async fn files(
-        &self,
-        session: &dyn Session,
-    ) -> Result<(RecordingsSource, Vec<(String, File)>)> {
+    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, File)>)> {
         let (source, robots) = match self {
-            Self::Path(folder) => (
-                RecordingsSource::Disk,
-                robots(folder).map_err(external_error)?,
-            ),
+            Self::Path(folder) => (RecordingsSource::Disk, robots(folder).map_err(external_error)?),
             Self::Stored(url) => {
                 // All objects below the URL.
                 let store = session.runtime_env().object_store(url)?;
@@ -105,11 +97,7 @@ impl RecordingsFolder {
                     Found {
                         name: parts.join("/"),
                         path: object.location.as_ref().into(),
-                        version: format!(
-                            "{} {}",
-                            object.size,
-                            object.last_modified.timestamp_micros()
-                        ),
+                        version: format!("{} {}", object.size, object.last_modified.timestamp_micros()),
                     }
                 });
                 let robots = by_robot(url, found).map_err(external_error)?;
@@ -149,9 +137,7 @@ impl RecordingsSource {
             None => ground.summarise_file(&file.name, &file.path),
             Some(bytes) => ground.summarise_bytes(&file.name, bytes.into()),
         });
-        summed
-            .await
-            .map_err(|error| DataFusionError::External(Box::new(error)))
+        summed.await.map_err(|error| DataFusionError::External(Box::new(error)))
     }
 }
 
@@ -249,11 +235,7 @@ impl PartitionStream for RecordingsPartition {
 
     /// One batch with one row per file, read when it is requested.
     fn execute(&self, _: Arc<TaskContext>) -> SendableRecordBatchStream {
-        let (ground, schema, source) = (
-            self.ground.clone(),
-            self.schema.clone(),
-            self.source.clone(),
-        );
+        let (ground, schema, source) = (self.ground.clone(), self.schema.clone(), self.source.clone());
         let batches = futures::stream::iter(self.files.clone()).then(move |(robot, file)| {
             let (ground, schema, source) = (ground.clone(), schema.clone(), source.clone());
             async move {
@@ -266,12 +248,7 @@ impl PartitionStream for RecordingsPartition {
 }
 
 /// The row of one recording.
-fn summary_row(
-    schema: SchemaRef,
-    robot: &str,
-    file: &File,
-    summary: &Summary,
-) -> Result<RecordBatch> {
+fn summary_row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

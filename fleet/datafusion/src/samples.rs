@@ -20,16 +20,12 @@ impl GroupSamples {
     /// leaves out, depending on the plan.
     pub(crate) fn add(&mut self, values: &[ArrayRef]) -> Result<()> {
         let Some((names, columns)) = values.split_first() else {
-            return exec_err!(
-                "samples have no columns; give the recording's name, time, coordinates and forces"
-            );
+            return exec_err!("samples have no columns; give the recording's name, time, coordinates and forces");
         };
         // Convert names and numbers to the types that are stored.
         let names = cast(names, &DataType::Utf8)?;
         let Some(names) = names.as_any().downcast_ref::<StringArray>() else {
-            return exec_err!(
-                "the names of recordings are not texts; cast the first column to text"
-            );
+            return exec_err!("the names of recordings are not texts; cast the first column to text");
         };
         let columns: Vec<Float64Array> = columns
             .iter()
@@ -37,19 +33,13 @@ impl GroupSamples {
                 let column = cast(column, &DataType::Float64)?;
                 let column = column.as_any().downcast_ref::<Float64Array>().cloned();
                 column.ok_or_else(|| {
-                    DataFusionError::Execution(
-                        "a column of samples is not numeric; cast it to double".to_owned(),
-                    )
+                    DataFusionError::Execution("a column of samples is not numeric; cast it to double".to_owned())
                 })
             })
             .collect::<Result<_>>()?;
         // Rows without a name are one recording.
         let name = |row: usize| {
-            if names.is_null(row) {
-                ""
-            } else {
-                names.value(row)
-            }
+            if names.is_null(row) { "" } else { names.value(row) }
         };
         let mut from = 0;
         while from < names.len() {
@@ -59,8 +49,7 @@ impl GroupSamples {
                 .find(|row| name(*row) != this)
                 .unwrap_or(names.len());
             if !self.recordings.contains_key(this) {
-                self.recordings
-                    .insert(this.to_owned(), vec![Vec::new(); columns.len()]);
+                self.recordings.insert(this.to_owned(), vec![Vec::new(); columns.len()]);
             }
             if let Some(kept) = self.recordings.get_mut(this) {
                 for (kept, column) in kept.iter_mut().zip(&columns) {
@@ -97,9 +86,10 @@ impl GroupSamples {
 
     /// Memory of the samples, bytes.
     pub(crate) fn size(&self) -> usize {
-        let columns = self.recordings.iter().map(|(name, columns)| {
-            name.capacity() + columns.iter().map(|one| 8 * one.capacity()).sum::<usize>()
-        });
+        let columns = self
+            .recordings
+            .iter()
+            .map(|(name, columns)| name.capacity() + columns.iter().map(|one| 8 * one.capacity()).sum::<usize>());
         columns.sum()
     }
 
@@ -137,18 +127,12 @@ impl GroupSamples {
 
     /// Adds the samples of one recording from the front of `left`; `None` if bytes are missing.
     fn add_one(&mut self, left: &mut &[u8]) -> Option<()> {
-        let mut number =
-            || usize::try_from(u64::from_le_bytes(take_bytes(left, 8)?.try_into().ok()?)).ok();
+        let mut number = || usize::try_from(u64::from_le_bytes(take_bytes(left, 8)?.try_into().ok()?)).ok();
         // Lengths, then name and columns, as they were written.
         let [length, columns, rows] = [number()?, number()?, number()?];
-        let name = std::str::from_utf8(take_bytes(left, length)?)
-            .ok()?
-            .to_owned();
+        let name = std::str::from_utf8(take_bytes(left, length)?).ok()?.to_owned();
         let all = take_bytes(left, columns.checked_mul(rows)?.checked_mul(8)?)?;
-        let kept = self
-            .recordings
-            .entry(name)
-            .or_insert_with(|| vec![Vec::new(); columns]);
+        let kept = self.recordings.entry(name).or_insert_with(|| vec![Vec::new(); columns]);
         for (kept, column) in kept.iter_mut().zip(all.chunks_exact((8 * rows).max(1))) {
             let values = column
                 .chunks_exact(8)

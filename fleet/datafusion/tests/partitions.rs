@@ -23,11 +23,7 @@ async fn answer(session: &SessionContext, sql: &str) -> Answer {
     let mut all = BTreeMap::new();
     for batch in batches {
         let [robot, day] = [0, 1].map(|k| {
-            datafusion::arrow::compute::cast(
-                batch.column(k),
-                &datafusion::arrow::datatypes::DataType::Utf8,
-            )
-            .unwrap()
+            datafusion::arrow::compute::cast(batch.column(k), &datafusion::arrow::datatypes::DataType::Utf8).unwrap()
         });
         let fits = batch.column(2).as_struct();
         for row in 0..batch.num_rows() {
@@ -65,14 +61,10 @@ fn of_files(ground: &Ground, files: &BTreeMap<String, Vec<File>>) -> Answer {
         for day in files.chunk_by(|a, b| a.day == b.day) {
             let mut sum = ground.empty();
             for file in day {
-                sum.merge(&ground.summarise_file(&file.name, &file.path))
-                    .unwrap();
+                sum.merge(&ground.summarise_file(&file.name, &file.path)).unwrap();
             }
             let fit = ground.solve(&sum).unwrap();
-            let values = fit
-                .parameters
-                .iter()
-                .flat_map(|one| [Some(one.value), one.deviation]);
+            let values = fit.parameters.iter().flat_map(|one| [Some(one.value), one.deviation]);
             let counts = [sum.recordings as f64, sum.bad.len() as f64].map(Some);
             expected.insert(
                 (robot.clone(), day[0].day.clone()),

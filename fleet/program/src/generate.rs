@@ -161,11 +161,7 @@ impl PlantedChange {
         let motor = |drive: &usize| ["motor_left", "motor_right"][*drive];
         match self {
             Self::Nothing => json!({ "kind": "none" }),
-            Self::Wear {
-                drive,
-                day,
-                per_day,
-            } => {
+            Self::Wear { drive, day, per_day } => {
                 json!({ "kind": "wear", "at": motor(drive), "day": days[*day], "place": day, "per_day": per_day })
             }
             Self::Load { day, mass } => {
@@ -218,35 +214,29 @@ pub fn generate(folder: &Path, size: &FleetSize) -> Result<Value, FleetFault> {
         .map(|r| (format!("R{r:05}"), planted_change(size, r)))
         .collect();
     let bad = bad_recordings(size);
-    robots
-        .par_iter()
-        .enumerate()
-        .try_for_each(|(r, (name, planted))| {
-            // One file for each recording, in folders by robot and day.
-            let robot = robot_parameters(size, r);
-            for day in 0..size.days {
-                for k in 0..size.per_day {
-                    let path = data
-                        .join(format!("robot={name}"))
-                        .join(format!("day={}", days[day]))
-                        .join(format!("recording={k}"));
-                    fs::create_dir_all(&path).map_err(|error| write_fault(&path, &error))?;
-                    let path = path.join("data.parquet");
-                    write_recording(&path, size, &motions, &robot, planted, (r, day, k))?;
-                    if bad.contains(&(r, day, k)) {
-                        truncate_file(&path)?;
-                    }
+    robots.par_iter().enumerate().try_for_each(|(r, (name, planted))| {
+        // One file for each recording, in folders by robot and day.
+        let robot = robot_parameters(size, r);
+        for day in 0..size.days {
+            for k in 0..size.per_day {
+                let path = data
+                    .join(format!("robot={name}"))
+                    .join(format!("day={}", days[day]))
+                    .join(format!("recording={k}"));
+                fs::create_dir_all(&path).map_err(|error| write_fault(&path, &error))?;
+                let path = path.join("data.parquet");
+                write_recording(&path, size, &motions, &robot, planted, (r, day, k))?;
+                if bad.contains(&(r, day, k)) {
+                    truncate_file(&path)?;
                 }
             }
-            Ok::<_, FleetFault>(())
-        })?;
+        }
+        Ok::<_, FleetFault>(())
+    })?;
     // The names of the recordings that were cut off.
-    let bad = bad.iter().map(|(r, day, k)| {
-        format!(
-            "robot={}/day={}/recording={k}/data.parquet",
-            robots[*r].0, days[*day]
-        )
-    });
+    let bad = bad
+        .iter()
+        .map(|(r, day, k)| format!("robot={}/day={}/recording={k}/data.parquet", robots[*r].0, days[*day]));
     let truth = json!({
         "seed": size.seed,
         "changes": size.changes,
@@ -498,8 +488,7 @@ fn write_recording(
     planted: &PlantedChange,
     (r, day, k): (usize, usize, usize),
 ) -> Result<(), FleetFault> {
-    let seed = size.seed
-        ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let seed = size.seed ^ ((r as u64) << 24 | (day as u64) << 8 | k as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     // A different part of one of the motions for each recording.
     let mut noise = GaussianNoise::new(seed, 3);
     let motion = &motions[random_index(&mut noise, MOTIONS)];
@@ -556,10 +545,7 @@ fn write_recording(
         let at = (start + i) % n;
         for j in 0..2 {
             positions[j].push(ENCODER.read(motion.q[j][at], &mut noise));
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "torques are stored with fewer digits"
-            )]
+            #[allow(clippy::cast_possible_truncation, reason = "torques are stored with fewer digits")]
             torques[j].push(TORQUE.read(torque[j][at], &mut noise) as f32);
         }
     }
@@ -605,11 +591,7 @@ fn write_parquet(
     .into_iter()
     .map(|(name, kind)| column(name, kind))
     .collect();
-    let schema = fields.and_then(|fields| {
-        Type::group_type_builder("recording")
-            .with_fields(fields)
-            .build()
-    });
+    let schema = fields.and_then(|fields| Type::group_type_builder("recording").with_fields(fields).build());
     let schema = Arc::new(schema.map_err(|error| fault(&error))?);
     let properties = WriterProperties::builder()
         .set_compression(Compression::UNCOMPRESSED)
@@ -618,22 +600,17 @@ fn write_parquet(
     let file = fs::File::create(path).map_err(|error| fault(&error))?;
     // One row group, with the columns in the order of the schema.
     let written = (|| {
-        let mut writer =
-            SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
+        let mut writer = SerializedFileWriter::new(BufWriter::new(file), schema, Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
         for values in [time, &positions[0], &positions[1]] {
             if let Some(mut column) = group.next_column()? {
-                column
-                    .typed::<DoubleType>()
-                    .write_batch(values, None, None)?;
+                column.typed::<DoubleType>().write_batch(values, None, None)?;
                 column.close()?;
             }
         }
         for values in torques {
             if let Some(mut column) = group.next_column()? {
-                column
-                    .typed::<FloatType>()
-                    .write_batch(values, None, None)?;
+                column.typed::<FloatType>().write_batch(values, None, None)?;
                 column.close()?;
             }
         }

@@ -74,10 +74,7 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
             states.display()
         ))
     })?;
-    let plan = plan(
-        asked,
-        &robots.values().map(Vec::as_slice).collect::<Vec<_>>(),
-    )?;
+    let plan = plan(asked, &robots.values().map(Vec::as_slice).collect::<Vec<_>>())?;
     let ground = plan.derive_model()?;
     let total: usize = robots.values().map(Vec::len).sum();
     // Counters for the progress and for the summaries that were stored by an earlier run.
@@ -148,16 +145,8 @@ pub fn identify(asked: &FleetRequest<'_>) -> Result<String, FleetFault> {
 
 /// The results in one sentence.
 pub(crate) fn summary_sentence(found: &FleetResults) -> String {
-    let changed = found
-        .robots
-        .iter()
-        .filter(|robot| !robot.changes.is_empty())
-        .count();
-    let dead = found
-        .robots
-        .iter()
-        .filter(|robot| !robot.dead.is_empty())
-        .count();
+    let changed = found.robots.iter().filter(|robot| !robot.changes.is_empty()).count();
+    let dead = found.robots.iter().filter(|robot| !robot.dead.is_empty()).count();
     format!(
         "{} robots: {changed} changed on some day, {dead} lost a sensor, {} differ from the others; {} recordings gave no result",
         found.robots.len(),
@@ -170,10 +159,7 @@ pub(crate) fn summary_sentence(found: &FleetResults) -> String {
 fn most_memory() -> String {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.map_or_else(
-        || "an unknown part".to_owned(),
-        |most| most.trim().to_owned(),
-    )
+    line.map_or_else(|| "an unknown part".to_owned(), |most| most.trim().to_owned())
 }
 
 /// The plan: the one that is given, the one in the folder, or a new one, which is written there.

@@ -91,9 +91,7 @@ impl ReadingArgs {
     fn reading(&self) -> Result<RecordingOptions, FleetFault> {
         let columns = self.map.iter().map(|text| {
             let (ours, theirs) = text.split_once('=').ok_or_else(|| {
-                FleetFault::new(format!(
-                    "`--map {text}` has no column; write it as `--map q1=pos_left`"
-                ))
+                FleetFault::new(format!("`--map {text}` has no column; write it as `--map q1=pos_left`"))
             })?;
             Ok((ours.to_owned(), theirs.to_owned()))
         });
@@ -191,13 +189,8 @@ fn run(command: FleetCommand) -> Result<String, FleetFault> {
             ))
         }
         FleetCommand::Plan(args) => {
-            let reference: Vec<&std::path::Path> =
-                args.reference.iter().map(PathBuf::as_path).collect();
-            let plan = modelmill_fleet::FleetPlan::from_recordings(
-                &args.model,
-                &args.reading.reading()?,
-                &reference,
-            )?;
+            let reference: Vec<&std::path::Path> = args.reference.iter().map(PathBuf::as_path).collect();
+            let plan = modelmill_fleet::FleetPlan::from_recordings(&args.model, &args.reading.reading()?, &reference)?;
             folder::write_atomic(&args.out, plan.json().as_bytes())?;
             Ok(format!(
                 "{} from {} reference recordings: cut-off {} Hz, every {}. sample kept\n",
@@ -211,9 +204,7 @@ fn run(command: FleetCommand) -> Result<String, FleetFault> {
         }
         FleetCommand::Identify(args) => {
             if let Some(threads) = args.threads {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build_global();
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
                 pool.map_err(FleetFault::new)?;
             }
             identify::identify(&identify::FleetRequest {

@@ -19,8 +19,7 @@ pub(crate) fn page(found: &FleetResults) -> String {
     let title = format!("A fleet of {} robots", found.robots.len());
     let mut page = begin_page(&title);
     // The verdict on top, then one section for each kind of result.
-    let is_quiet =
-        found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
+    let is_quiet = found.outliers.found.is_empty() && found.robots.iter().all(RobotHistory::is_quiet);
     let class = if is_quiet { "adequate" } else { "missing" };
     let _ = writeln!(
         page,
@@ -29,22 +28,10 @@ pub(crate) fn page(found: &FleetResults) -> String {
     );
     let sections = [
         ("changed", "Robots that changed", changed_robots(found)),
-        (
-            "differ",
-            "Robots that differ from the others",
-            outlier_table(found),
-        ),
+        ("differ", "Robots that differ from the others", outlier_table(found)),
         ("sensors", "Dead sensors", dead_sensor_table(found)),
-        (
-            "usual",
-            "Usual values of this fleet",
-            usual_values_table(found),
-        ),
-        (
-            "bad",
-            "Recordings without a result",
-            bad_recordings_table(found),
-        ),
+        ("usual", "Usual values of this fleet", usual_values_table(found)),
+        ("bad", "Recordings without a result", bad_recordings_table(found)),
     ];
     for (id, title, html) in sections {
         let _ = write!(
@@ -83,20 +70,14 @@ fn change_clarity(robot: &RobotHistory) -> f64 {
     // Steps without standard deviations give no finite ratio and do not count.
     let steps = robot.changes.iter().flat_map(|since| &since.steps);
     steps
-        .map(|step| {
-            (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now)
-        })
+        .map(|step| (step.now.value - step.before.value).abs() / step.before.difference_deviation(step.now))
         .filter(|x| x.is_finite())
         .fold(0.0, f64::max)
 }
 
 /// The section of robots that changed, the most significant first: days, physical changes, and one picture for each.
 fn changed_robots(found: &FleetResults) -> String {
-    let mut robots: Vec<&RobotHistory> = found
-        .robots
-        .iter()
-        .filter(|robot| !robot.changes.is_empty())
-        .collect();
+    let mut robots: Vec<&RobotHistory> = found.robots.iter().filter(|robot| !robot.changes.is_empty()).collect();
     if robots.is_empty() {
         return "<p>No robot changed permanently.</p>\n".to_owned();
     }
@@ -147,13 +128,7 @@ fn changed_robots(found: &FleetResults) -> String {
                 Some((since.day, [own.before.value, own.now.value]))
             })
             .collect();
-        html.push_str(&parameter_history(
-            &infos[k],
-            "day",
-            robot.days.len(),
-            &known,
-            &steps,
-        ));
+        html.push_str(&parameter_history(&infos[k], "day", robot.days.len(), &known, &steps));
     }
     // Further robots are listed without pictures.
     if robots.len() > MOST_PICTURED {
@@ -216,27 +191,16 @@ fn dead_sensor_table(found: &FleetResults) -> String {
                     TableCell::text(&dead.sensor),
                     TableCell::text(&robot.days[dead.day].name),
                     TableCell::number(&dead.days.to_string(), dead.days as f64),
-                    TableCell::number(
-                        &format!("{:.0} %", 100.0 * dead.first.still),
-                        dead.first.still,
-                    ),
+                    TableCell::number(&format!("{:.0} %", 100.0 * dead.first.still), dead.first.still),
                     TableCell::text(&dead.first.recording),
                 ]
             })
         })
         .collect();
     if rows.is_empty() {
-        return "<p>There are none: all readings change while their machines move.</p>\n"
-            .to_owned();
+        return "<p>There are none: all readings change while their machines move.</p>\n".to_owned();
     }
-    let head = [
-        "robot",
-        "sensor",
-        "from",
-        "#days",
-        "#constant for",
-        "first recording",
-    ];
+    let head = ["robot", "sensor", "from", "#days", "#constant for", "first recording"];
     table("sensors", &head, &rows)
 }
 
@@ -260,13 +224,7 @@ fn usual_values_table(found: &FleetResults) -> String {
             ])
         })
         .collect();
-    let head = [
-        "parameter",
-        "#median",
-        "#spread of the robots",
-        "unit",
-        "expression",
-    ];
+    let head = ["parameter", "#median", "#spread of the robots", "unit", "expression"];
     format!(
         "<p>Of each robot only the days before its first change are used.</p>\n{}",
         table("parameters", &head, &rows)

@@ -17,8 +17,7 @@ fn read(path: &Path) -> Result<Value, FleetFault> {
             path.display()
         ))
     })?;
-    serde_json::from_str(&text)
-        .map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
+    serde_json::from_str(&text).map_err(|error| FleetFault::new(format!("{}: {error}", path.display())))
 }
 
 /// Counts for one kind of change.
@@ -44,10 +43,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
     let truth = read(truth)?;
     // Days by name, so that distances between days can be counted.
     let days: Vec<String> = list(&truth["days"]).iter().map(text).collect();
-    let place = |day: &Value| {
-        days.iter()
-            .position(|one| Some(one.as_str()) == day.as_str())
-    };
+    let place = |day: &Value| days.iter().position(|one| Some(one.as_str()) == day.as_str());
     // Results by the name of the robot.
     let robots: BTreeMap<String, Value> = list(&results["robots"])
         .into_iter()
@@ -71,9 +67,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
         let (since, dead) = (list(&robot["since"]), list(&robot["dead_sensors"]));
         let kind = text(&planted["kind"]);
         let tally = tallies.entry(kind.clone()).or_default();
-        let at = planted["place"]
-            .as_u64()
-            .and_then(|day| usize::try_from(day).ok());
+        let at = planted["place"].as_u64().and_then(|day| usize::try_from(day).ok());
         // A day counts as right if it is at most one day off.
         let is_near = |day: &Value| {
             place(day)
@@ -91,10 +85,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                         .or(differ.get(&name).map(|one| &one["changes"]));
                     alarms.push(format!(
                         "{name}: {} {}",
-                        since
-                            .first()
-                            .map(|one| text(&one["day"]))
-                            .unwrap_or_default(),
+                        since.first().map(|one| text(&one["day"])).unwrap_or_default(),
                         changes
                             .and_then(|changes| changes[0]["says"].as_str())
                             .unwrap_or("a parameter changed")
@@ -104,10 +95,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
             }
             "dead_sensor" => {
                 // The sensor itself must be reported, not only any sensor.
-                let own: Vec<&Value> = dead
-                    .iter()
-                    .filter(|one| one["sensor"] == planted["at"])
-                    .collect();
+                let own: Vec<&Value> = dead.iter().filter(|one| one["sensor"] == planted["at"]).collect();
                 let near = own.iter().any(|one| is_near(&one["day"]));
                 (!own.is_empty(), near, !own.is_empty())
             }
@@ -139,9 +127,9 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
                 .flat_map(|one| list(&one["changes"]))
                 .map(|one| text(&one["says"]))
                 .collect::<Vec<_>>();
-            tally.missed.push(format!(
-                "{name} simulated {planted}, found {days:?} {says:?}"
-            ));
+            tally
+                .missed
+                .push(format!("{name} simulated {planted}, found {days:?} {says:?}"));
         }
     }
     let mut says = score_text(&tallies, sound, &alarms);
@@ -152,11 +140,7 @@ pub fn score(found: &Path, truth: &Path) -> Result<String, FleetFault> {
 /// Whether one of the changes is of a kind, at a place if one is named.
 fn has_change(changes: &Value, kind: &str, at: Option<&str>) -> bool {
     list(changes).iter().any(|change| {
-        let is_there = at.is_none_or(|at| {
-            list(&change["at"])
-                .iter()
-                .any(|one| one.as_str() == Some(at))
-        });
+        let is_there = at.is_none_or(|at| list(&change["at"]).iter().any(|one| one.as_str() == Some(at)));
         change["kind"].as_str() == Some(kind) && is_there
     })
 }

@@ -83,10 +83,7 @@ impl SummaryStore {
             entry.extend_from_slice(&(part.len() as u64).to_le_bytes());
             entry.extend_from_slice(part);
         }
-        let mut file = self
-            .file
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut file = self.file.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         file.write_all(&entry).map_err(|error| {
             FleetFault::new(format!(
                 "{} cannot be written: {error}; free disk space and start again; the job continues where it stopped",

@@ -48,24 +48,14 @@ impl Fleet {
     }
 
     fn results(&self, out: &str) -> Value {
-        serde_json::from_str(
-            &fs::read_to_string(self.at(out).join("results.json")).expect("results"),
-        )
-        .expect("JSON")
+        serde_json::from_str(&fs::read_to_string(self.at(out).join("results.json")).expect("results")).expect("JSON")
     }
 
     fn ground(&self) -> FleetModel {
         let first = self.at("recordings/robot=R00000/day=2026-03-01/recording=0/data.parquet");
-        let plan = FleetPlan::from_recordings(
-            &self.at("model.toml"),
-            &RecordingOptions::default(),
-            &[&first],
-        )
-        .expect("a plan");
-        assert_eq!(
-            FleetPlan::parse("the plan", &plan.json()).expect("a plan"),
-            plan
-        );
+        let plan = FleetPlan::from_recordings(&self.at("model.toml"), &RecordingOptions::default(), &[&first])
+            .expect("a plan");
+        assert_eq!(FleetPlan::parse("the plan", &plan.json()).expect("a plan"), plan);
         plan.derive_model().expect("a ground")
     }
 }
@@ -111,19 +101,12 @@ fn what_was_planted_is_found_and_a_killed_job_goes_on() {
     fs::write(&states[0], &cut[..cut.len() - 100]).unwrap();
     fs::remove_file(&states[1]).unwrap();
     let says = fleet.identify("out");
-    assert!(
-        says.contains("70 recordings, 62 of which were done before"),
-        "{says}"
-    );
+    assert!(says.contains("70 recordings, 62 of which were done before"), "{says}");
     assert_eq!(fleet.results("out"), before);
     // Another model does not go on from there.
     let model = fs::read_to_string(fleet.at("model.toml")).unwrap();
     fs::write(fleet.at("model.toml"), model.replace("0.8", "0.81")).unwrap();
-    let (model, recordings, out) = (
-        fleet.at("model.toml"),
-        fleet.at("recordings"),
-        fleet.at("out"),
-    );
+    let (model, recordings, out) = (fleet.at("model.toml"), fleet.at("recordings"), fleet.at("out"));
     let asked = FleetRequest {
         model: &model,
         recordings: &recordings,
@@ -131,12 +114,7 @@ fn what_was_planted_is_found_and_a_killed_job_goes_on() {
         plan: None,
         reading: &RecordingOptions::default(),
     };
-    assert!(
-        identify(&asked)
-            .unwrap_err()
-            .to_string()
-            .contains("another model")
-    );
+    assert!(identify(&asked).unwrap_err().to_string().contains("another model"));
 }
 
 #[test]
@@ -162,10 +140,7 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     assert_eq!(whole.recordings, 21);
     near(&whole, &sum(&mut summaries.iter().rev()), &ground);
     // Parts of parts.
-    let parts: Vec<FleetSummary> = summaries
-        .chunks(4)
-        .map(|some| sum(&mut some.iter()))
-        .collect();
+    let parts: Vec<FleetSummary> = summaries.chunks(4).map(|some| sum(&mut some.iter())).collect();
     near(&whole, &sum(&mut parts.iter().rev()), &ground);
     // As bytes; changed bytes are recognised.
     let bytes = whole.bytes();
@@ -189,10 +164,7 @@ fn summaries_add_in_any_order_and_samples_come_in_any() {
     assert_ne!(shuffled, columns);
     let [a, b] = [columns, shuffled].map(|columns| ground.summarise("one", columns));
     assert_eq!(a, b);
-    assert_eq!(
-        (a.recordings, &a.all_columns),
-        (1, &summaries[3].all_columns)
-    );
+    assert_eq!((a.recordings, &a.all_columns), (1, &summaries[3].all_columns));
 }
 
 #[test]
@@ -220,13 +192,7 @@ fn recordings_that_give_no_answer_are_named() {
         let summary = ground.summarise(name, columns);
         assert_eq!((summary.recordings, summary.bad.len()), (0, 1));
         assert!(summary.bad[0].says.contains(why), "{}", summary.bad[0].says);
-        assert!(
-            ground
-                .solve(&summary)
-                .unwrap_err()
-                .to_string()
-                .contains(name)
-        );
+        assert!(ground.solve(&summary).unwrap_err().to_string().contains(name));
         sum.merge(&summary).expect("one plan");
     }
     let fit = ground.solve(&sum).expect("that of the good one");
@@ -235,13 +201,8 @@ fn recordings_that_give_no_answer_are_named() {
 
 /// The columns of a file.
 fn read(path: &Path, ground: &FleetModel) -> Vec<(String, Vec<f64>)> {
-    let model = modelmill::Model::open(
-        path.ancestors()
-            .nth(5)
-            .expect("the fleet's folder")
-            .join("model.toml"),
-    )
-    .expect("a model");
+    let model = modelmill::Model::open(path.ancestors().nth(5).expect("the fleet's folder").join("model.toml"))
+        .expect("a model");
     let recording = model
         .recording(path, &RecordingOptions::default())
         .expect("a recording");

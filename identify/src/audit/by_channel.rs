@@ -31,9 +31,7 @@ impl ChannelRegressor {
             // A column belongs to a channel if it is not zero in all of its rows.
             let acts = |k: &usize| (0..samples).any(|i| regressor[(i * channels + c, *k)] != 0.0);
             let which: Vec<usize> = (0..regressor.ncols()).filter(acts).collect();
-            let rows = DMatrix::from_fn(samples, which.len(), |i, k| {
-                regressor[(i * channels + c, which[k])]
-            });
+            let rows = DMatrix::from_fn(samples, which.len(), |i, k| regressor[(i * channels + c, which[k])]);
             ChannelRows {
                 column_indices: which,
                 rows,
@@ -77,12 +75,7 @@ impl ChannelRegressor {
 
     /// Appends `further` columns. Channel `c` gets the values of `of` (interleaved per sample) in the new column
     /// `takes(c)`.
-    pub(super) fn append_columns(
-        &self,
-        further: usize,
-        takes: impl Fn(usize) -> usize,
-        of: &DVector<f64>,
-    ) -> Self {
+    pub(super) fn append_columns(&self, further: usize, takes: impl Fn(usize) -> usize, of: &DVector<f64>) -> Self {
         let n = self.channels.len();
         let channels = self.channels.iter().enumerate().map(|(c, channel)| {
             // The new column is the last one of each channel.
@@ -128,11 +121,7 @@ impl ChannelRegressor {
         for (c, channel) in self.channels.iter().enumerate() {
             // Entries of this channel.
             let own = DVector::from_fn(channel.rows.nrows(), |i, _| of[i * n + c]);
-            for (k, column) in channel
-                .column_indices
-                .iter()
-                .zip(channel.rows.column_iter())
-            {
+            for (k, column) in channel.column_indices.iter().zip(channel.rows.column_iter()) {
                 result[*k] += column.dot(&own);
             }
         }
@@ -174,12 +163,7 @@ impl ChannelRegressor {
 
     /// Used rows of some channels as one dense matrix, each multiplied by the weight of its channel; with their
     /// indices, `sample * channels + channel`. It has only the columns of these channels.
-    pub(super) fn dense_rows(
-        &self,
-        of: &[usize],
-        counts: &[bool],
-        weights: &[f64],
-    ) -> (DMatrix<f64>, Vec<usize>) {
+    pub(super) fn dense_rows(&self, of: &[usize], counts: &[bool], weights: &[f64]) -> (DMatrix<f64>, Vec<usize>) {
         let n = self.channels.len();
         let mut place = vec![None; self.columns];
         let mut width = 0;
@@ -221,20 +205,12 @@ mod tests {
         let mut noise = TestNoise::new(5);
         let (n, samples, columns) = (3, 40, 7);
         let whole = DMatrix::from_fn(n * samples, columns, |row, k| {
-            if (row % n + k) % 2 == 0 {
-                noise.normal()
-            } else {
-                0.0
-            }
+            if (row % n + k) % 2 == 0 { noise.normal() } else { 0.0 }
         });
         let weights = DVector::from_fn(n * samples, |_, _| noise.normal().abs());
         let measured = DVector::from_fn(n * samples, |_, _| noise.normal());
         let rows = ChannelRegressor::new(&whole, n);
-        assert!(
-            rows.channels
-                .iter()
-                .all(|c| c.column_indices.len() < columns)
-        );
+        assert!(rows.channels.iter().all(|c| c.column_indices.len() < columns));
         let values = DVector::from_fn(columns, |_, _| noise.normal());
         let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() < 1e-12;
         let column = |v: DVector<f64>| DMatrix::from_column_slice(v.len(), 1, v.as_slice());

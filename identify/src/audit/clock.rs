@@ -9,9 +9,8 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
 use super::thresholds::{
-    CLOCK_AGREEING_OF_THREE, CLOCK_AGREEMENT_SHARE, CLOCK_RATIOS, CLOCK_SQUARED_CORRELATION,
-    MIN_CLOCK_ERROR, REPEATED_CHANCE_FACTOR, REPEATED_FEWEST_POSITIONS, REPEATED_FEWEST_SAMPLES,
-    REPEATED_LEAST_SHARE,
+    CLOCK_AGREEING_OF_THREE, CLOCK_AGREEMENT_SHARE, CLOCK_RATIOS, CLOCK_SQUARED_CORRELATION, MIN_CLOCK_ERROR,
+    REPEATED_CHANCE_FACTOR, REPEATED_FEWEST_POSITIONS, REPEATED_FEWEST_SAMPLES, REPEATED_LEAST_SHARE,
 };
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::median;
@@ -28,10 +27,7 @@ impl SignalRecording {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
-        let mut notes: Vec<RecordingNote> = self
-            .clock_error_note(time, coordinates)
-            .into_iter()
-            .collect();
+        let mut notes: Vec<RecordingNote> = self.clock_error_note(time, coordinates).into_iter().collect();
         notes.extend(self.repeated_samples_note(time, coordinates));
         notes
     }
@@ -201,17 +197,10 @@ mod tests {
         let counted = recording(|i| 1e-3 * f64::from(i), false);
         assert_eq!(counted.len(), 1);
         let says = counted[0].says.in_library_words();
-        assert!(
-            says.contains("too slowly") && says.contains("1.02 times"),
-            "{says}"
-        );
+        assert!(says.contains("too slowly") && says.contains("1.02 times"), "{says}");
         let repeated = recording(|i| 1.02e-3 * f64::from(i), true);
         assert!(
-            repeated.len() == 1
-                && repeated[0]
-                    .says
-                    .in_library_words()
-                    .contains("In 100 of 4000"),
+            repeated.len() == 1 && repeated[0].says.in_library_words().contains("In 100 of 4000"),
             "{repeated:?}"
         );
     }

@@ -9,9 +9,8 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, OptionSetting, Remedy};
 
 use super::thresholds::{
-    LONGEST_STEP_S, RATE_FEWEST_SAMPLES, RATE_MOST_MISFIT, RATE_MOST_NOISE, RATE_RATIO_TOLERANCE,
-    SAME_RATIO_TOLERANCE, SHORTEST_STEP_S, WRAP_LEAST_STEPS, WRAP_TOLERANCE_DEG,
-    WRAP_TOLERANCE_RAD,
+    LONGEST_STEP_S, RATE_FEWEST_SAMPLES, RATE_MOST_MISFIT, RATE_MOST_NOISE, RATE_RATIO_TOLERANCE, SAME_RATIO_TOLERANCE,
+    SHORTEST_STEP_S, WRAP_LEAST_STEPS, WRAP_TOLERANCE_DEG, WRAP_TOLERANCE_RAD,
 };
 use crate::motion::{DerivativeSource, PreparedRun};
 use crate::recording::{GAP_LEAST_STEPS, RecordingNote, SignalRecording};
@@ -46,11 +45,7 @@ impl PreparedRun {
 impl SignalRecording {
     /// Warnings about columns that can be read but are probably wrong. `coordinates` are `(name, whether it is an
     /// angle)`; columns that cannot be used are skipped.
-    pub fn suspicious_columns(
-        &self,
-        coordinates: &[(String, bool)],
-        source: DerivativeSource,
-    ) -> Vec<RecordingNote> {
+    pub fn suspicious_columns(&self, coordinates: &[(String, bool)], source: DerivativeSource) -> Vec<RecordingNote> {
         let Ok(time) = self.column("t") else {
             return Vec::new();
         };
@@ -96,9 +91,8 @@ impl SignalRecording {
     /// too: all except those that are the derivatives in rad of the recorded signal before them.
     pub fn degree_conversion_options(&self, name: &str) -> Vec<OptionSetting> {
         // An option that reads a column in another unit.
-        let map = |column: &str, unit: &str| {
-            OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"))
-        };
+        let map =
+            |column: &str, unit: &str| OptionSetting::new(OptionName::Columns, format!("{column}={column} [{unit}]"));
         let mut maps = vec![map(name, "deg")];
         for (of, order, unit) in [("", "_d", "deg/s"), ("_d", "_dd", "deg/s^2")] {
             let [of, rate] = [of, order].map(|suffix| format!("{name}{suffix}"));
@@ -130,9 +124,7 @@ impl SignalRecording {
             (2.0 * PI, WRAP_TOLERANCE_RAD, "2 pi", ""),
             (360.0, WRAP_TOLERANCE_DEG, "360", " and in degrees"),
         ] {
-            let jumps = |step: &f64| {
-                (step.abs() - turn).abs() < slack && step.abs() > WRAP_LEAST_STEPS * usual
-            };
+            let jumps = |step: &f64| (step.abs() - turn).abs() < slack && step.abs() > WRAP_LEAST_STEPS * usual;
             let Some(first) = steps.iter().position(jumps) else {
                 continue;
             };
@@ -160,11 +152,7 @@ impl SignalRecording {
 
     /// Warnings about rates and accelerations that are not the derivatives of the recorded signal before them, one for
     /// each explanation; and whether any rates are.
-    fn rate_mismatch_notes(
-        &self,
-        coordinates: &[(String, bool)],
-        time: &[f64],
-    ) -> (Vec<RecordingNote>, bool) {
+    fn rate_mismatch_notes(&self, coordinates: &[(String, bool)], time: &[f64]) -> (Vec<RecordingNote>, bool) {
         let mut found: Vec<(Message, Vec<String>, Vec<String>, f64)> = Vec::new();
         let mut settled = false;
         for (name, is_angle) in coordinates {
@@ -190,8 +178,7 @@ impl SignalRecording {
                 };
                 // Columns with the same explanation and ratio share one warning.
                 match found.iter_mut().find(|(other, .., r)| {
-                    *other == why
-                        && (why.is_empty() || (r / ratio - 1.0).abs() < SAME_RATIO_TOLERANCE)
+                    *other == why && (why.is_empty() || (r / ratio - 1.0).abs() < SAME_RATIO_TOLERANCE)
                 }) {
                     Some((_, ofs, rates, _)) => {
                         ofs.push(of);
@@ -377,18 +364,12 @@ mod tests {
     fn slips_of_units_are_named() {
         let n = 2000;
         check(&recording(n, |t| t, q, qd), "");
-        check(
-            &recording(n, |t| t, q, |t| qd(t).to_degrees()),
-            "about 57.3 times",
-        );
+        check(&recording(n, |t| t, q, |t| qd(t).to_degrees()), "about 57.3 times");
         check(&recording(n, |t| t, q, |t| qd(t).to_degrees()), "degrees");
         check(&recording(n, |t| 1e3 * t, q, qd), "time seems to be in ms");
         check(&recording(n, |t| t, q, |t| -qd(t)), "the signs differ");
         check(&recording(n, |t| t, q, |t| 2.0 * qd(t)), "check the units");
-        check(
-            &recording(n, |t| t, q, |t| (7.0 * t).sin()),
-            "which column is which",
-        );
+        check(&recording(n, |t| t, q, |t| (7.0 * t).sin()), "which column is which");
     }
 
     #[test]
@@ -428,8 +409,7 @@ mod tests {
     fn a_wrapped_angle_is_named_with_its_line() {
         let wrap = |t: f64| (0.8 * t + PI).rem_euclid(2.0 * PI) - PI;
         let wrapped = recording(4000, |t| t, wrap, |_| 0.8);
-        let notes =
-            wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
+        let notes = wrapped.suspicious_columns(&[("q".to_owned(), true)], DerivativeSource::Positions);
         assert!(
             notes.len() == 1
                 && notes[0].says.in_library_words().contains("jumps by 2 pi")
@@ -463,10 +443,7 @@ mod tests {
         assert_eq!(runs.len(), 2);
         assert!(
             runs[0].notes[0].says.in_library_words().contains("1 gap")
-                && runs[0].notes[0]
-                    .says
-                    .in_library_words()
-                    .contains("after line 1251"),
+                && runs[0].notes[0].says.in_library_words().contains("after line 1251"),
             "{:?}",
             runs[0].notes
         );

@@ -91,9 +91,7 @@ impl ForceDelays {
         starts.push(vec![audit.coarse_shift(&all, &now.residuals)?; channels]);
         if channels > 1 {
             // One shift for each channel by itself.
-            let each = all
-                .iter()
-                .map(|c| audit.coarse_shift(&[*c], &now.residuals));
+            let each = all.iter().map(|c| audit.coarse_shift(&[*c], &now.residuals));
             starts.push(each.map(Option::unwrap_or_default).collect());
         }
         // Equal starting points need one fit only.
@@ -110,11 +108,7 @@ impl ForceDelays {
             })
         };
         let together = best(1)?;
-        let alone = if channels > 1 {
-            best(channels)?
-        } else {
-            best(1)?
-        };
+        let alone = if channels > 1 { best(channels)? } else { best(1)? };
         Some(Self {
             common: together.delays[0],
             by_channel: alone.delays,
@@ -134,10 +128,7 @@ impl DelayAudit<'_> {
 
     /// Forces of some channels at times that are later by a shift (s) of each, and whether each row counts; forces of
     /// other channels are zero.
-    fn shift_forces(
-        &self,
-        shifts: impl Iterator<Item = (usize, f64)>,
-    ) -> (DVector<f64>, Vec<bool>) {
+    fn shift_forces(&self, shifts: impl Iterator<Item = (usize, f64)>) -> (DVector<f64>, Vec<bool>) {
         let channels = self.forces.len();
         let mut forces = DVector::zeros(self.used_rows.len());
         let mut counts = self.used_rows.clone();
@@ -149,10 +140,7 @@ impl DelayAudit<'_> {
                 let row = k * channels + c;
                 let at = time + shift;
                 // First recorded sample that is not before the shifted time; times ascend.
-                above += self.recording_time[above..last]
-                    .iter()
-                    .take_while(|t| **t < at)
-                    .count();
+                above += self.recording_time[above..last].iter().take_while(|t| **t < at).count();
                 let [t, next] = [self.recording_time[above - 1], self.recording_time[above]];
                 let part = (at - t) / (next - t);
                 let is_in = (-1e-6..=1.0 + 1e-6).contains(&part);
@@ -189,9 +177,7 @@ impl DelayAudit<'_> {
             (left[c] * size).max(f64::MIN_POSITIVE.sqrt()).recip()
         };
         let weights: Vec<f64> = (0..n).map(weight).collect();
-        let (mut weighted, rows) = self
-            .regressor
-            .dense_rows(channels, &self.used_rows, &weights);
+        let (mut weighted, rows) = self.regressor.dense_rows(channels, &self.used_rows, &weights);
         for mut column in weighted.column_iter_mut() {
             let norm = column.norm();
             if norm > 0.0 {
@@ -261,13 +247,9 @@ impl DelayAudit<'_> {
             let late = -self.slope.multiply(&fit.values.as_slice()[..width]);
             let columns = self.regressor.append_columns(delays, |c| c % delays, &late);
             fit = robust_fit(&columns, &forces, &counts)?;
-            let further: Vec<f64> = (0..channels)
-                .map(|c| fit.values[width + c % delays])
-                .collect();
+            let further: Vec<f64> = (0..channels).map(|c| fit.values[width + c % delays]).collect();
             // Finish if the remaining delay is within the range of the linearisation.
-            let is_near = further
-                .iter()
-                .all(|f| f.abs() < WHOLE_STEP_TOLERANCE * step);
+            let is_near = further.iter().all(|f| f.abs() < WHOLE_STEP_TOLERANCE * step);
             if (is_near && round > 0) || round + 1 == ROUNDS {
                 let widths = Self::half_widths(&columns, &fit, &forces, delays)?;
                 let of = |c: usize| DelayEstimate {
@@ -279,9 +261,7 @@ impl DelayAudit<'_> {
             }
             // Otherwise move the shifts by full steps and fit again.
             for (shift, further) in shifts.iter_mut().zip(&further) {
-                let steps = (further / step)
-                    .clamp(-MAX_ROUND_STEPS, MAX_ROUND_STEPS)
-                    .round();
+                let steps = (further / step).clamp(-MAX_ROUND_STEPS, MAX_ROUND_STEPS).round();
                 *shift = (*shift + steps * step).clamp(-self.max_delay, self.max_delay);
             }
             (forces, counts) = self.shift_all_forces(&shifts);
@@ -299,9 +279,7 @@ impl DelayAudit<'_> {
     ) -> DelayFit {
         let channels = self.forces.len();
         let sum = |values: &DVector<f64>, c: usize, power: i32| -> f64 {
-            let rows = (c..values.len())
-                .step_by(channels)
-                .filter(|row| counts[*row]);
+            let rows = (c..values.len()).step_by(channels).filter(|row| counts[*row]);
             rows.map(|row| values[row].abs().powi(power)).sum()
         };
         let part = |c: usize, power: i32| {
@@ -353,10 +331,7 @@ impl DelayAudit<'_> {
         let count = without.len() as f64;
         let of = |k: usize| {
             let mean = without.iter().map(|values| values[k]).sum::<f64>() / count;
-            let sum: f64 = without
-                .iter()
-                .map(|values| (values[k] - mean).powi(2))
-                .sum();
+            let sum: f64 = without.iter().map(|values| (values[k] - mean).powi(2)).sum();
             DELAY_STUDENT_FACTOR * ((count - 1.0) / count * sum).sqrt()
         };
         Some((0..last).map(of).collect())
@@ -403,9 +378,7 @@ mod tests {
             .collect();
         let time: Vec<f64> = recorded[200..n - 200].iter().copied().step_by(2).collect();
         let matrix = |which: usize| {
-            let rows = time
-                .iter()
-                .flat_map(|t| row(*t)[which].into_iter().flatten());
+            let rows = time.iter().flat_map(|t| row(*t)[which].into_iter().flatten());
             ChannelRegressor::new(&DMatrix::from_row_iterator(2 * time.len(), 3, rows), 2)
         };
         let audit = DelayAudit {
@@ -429,10 +402,7 @@ mod tests {
             assert!(off < 0.02, "{late}: {both:?}");
             let first = found([late, 0.0], 0.0, 1);
             for (delay, late) in first.by_channel.iter().zip([late, 0.0]) {
-                assert!(
-                    (delay.seconds / STEP - late).abs() < 0.02,
-                    "{late}: {first:?}"
-                );
+                assert!((delay.seconds / STEP - late).abs() < 0.02, "{late}: {first:?}");
             }
         }
     }

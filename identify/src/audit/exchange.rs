@@ -119,15 +119,9 @@ mod tests {
     #[test]
     fn exchanged_and_turned_forces_are_found() {
         let (samples, forces) = forces();
-        let explained = ForceAudit::new(ChannelRegressor::new(
-            &rows(|k| k as f64 * 0.002, &samples),
-            2,
-        ))
-        .unwrap();
+        let explained = ForceAudit::new(ChannelRegressor::new(&rows(|k| k as f64 * 0.002, &samples), 2)).unwrap();
         let interleaved = |channels: [&Vec<f64>; 2], sign: f64| {
-            let rows = samples
-                .iter()
-                .flat_map(|k| [channels[0][*k], sign * channels[1][*k]]);
+            let rows = samples.iter().flat_map(|k| [channels[0][*k], sign * channels[1][*k]]);
             DVector::from_iterator(2 * samples.len(), rows)
         };
         let swapped = interleaved([&forces[1], &forces[0]], 1.0);

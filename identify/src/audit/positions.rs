@@ -5,10 +5,9 @@
 //! coordinates. With backlash, the position jumps each time the load changes sides, by one length to and fro.
 
 use super::thresholds::{
-    BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS,
-    BACKLASH_FEWEST_JUMPS, BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE,
-    FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES, JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH,
-    POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
+    BACKLASH_ALIKE_OF_FIVE, BACKLASH_ALTERNATING_OF_FIVE, BACKLASH_ENCODER_STEPS, BACKLASH_FEWEST_JUMPS,
+    BACKLASH_JUMP_SIGMAS, BACKLASH_SIZE_TOLERANCE, BACKLASH_TRAVEL_SHARE, FAST_RATE_SHARE, JITTER_FEWEST_SAMPLES,
+    JITTER_MIN_AGREEMENT, JITTER_MIN_ERROR_GROWTH, POSITION_FAULT_NEIGHBOURHOODS, SLOW_RATE_SHARE,
 };
 use crate::recording::SignalRecording;
 use crate::signal::median;
@@ -103,9 +102,7 @@ impl CubicResidual {
 fn fit_cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
     let points: Vec<(f64, f64)> = points.collect();
     // Scale the times to -1..1.
-    let scale = points
-        .iter()
-        .fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
+    let scale = points.iter().fold(f64::MIN_POSITIVE, |m, (t, _)| m.max(t.abs()));
     let n = if step == 0.0 { 4 } else { 5 };
     let mut gram = nalgebra::DMatrix::<f64>::zeros(n, n);
     let mut right = nalgebra::DVector::<f64>::zeros(n);
@@ -123,10 +120,7 @@ fn fit_cubic(points: impl Iterator<Item = (f64, f64)>, step: f64) -> [f64; 2] {
         return [0.0; 2];
     };
     let found = factor.solve(&right);
-    [
-        if step == 0.0 { found[0] } else { found[4] },
-        found[1] / scale,
-    ]
+    [if step == 0.0 { found[0] } else { found[4] }, found[1] / scale]
 }
 
 /// The rms time error of the stamps, s, if the errors of all coordinates grow with the rate and agree on the time
@@ -145,10 +139,7 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
             let sizes = pairs.clone().filter(|(_, v)| wanted(v.abs() / fastest));
             median(sizes.map(|(e, _)| e.abs()).collect())
         };
-        let [slow, fast] = [
-            size(&|v| v < SLOW_RATE_SHARE),
-            size(&|v| v > FAST_RATE_SHARE),
-        ];
+        let [slow, fast] = [size(&|v| v < SLOW_RATE_SHARE), size(&|v| v > FAST_RATE_SHARE)];
         if fastest <= 0.0 || fast <= JITTER_MIN_ERROR_GROWTH * slow {
             return None;
         }
@@ -170,8 +161,7 @@ fn timing_jitter(all: &[CubicResidual]) -> Option<f64> {
             let sum = |of: &dyn Fn(&(f64, f64)) -> f64| both.iter().map(of).sum::<f64>();
             // Correlation of the time errors at samples where both coordinates are fast.
             let alike = sum(&|(a, b)| a * b) / (sum(&|(a, _)| a * a) * sum(&|(_, b)| b * b)).sqrt();
-            if both.len() < JITTER_FEWEST_SAMPLES || alike.is_nan() || alike < JITTER_MIN_AGREEMENT
-            {
+            if both.len() < JITTER_FEWEST_SAMPLES || alike.is_nan() || alike < JITTER_MIN_AGREEMENT {
                 return None;
             }
             times.extend(both.iter().map(|(a, _)| a * a));
@@ -188,9 +178,7 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
         let about = (i - JUMP_NEIGHBOURS..=i + JUMP_NEIGHBOURS).filter(|k| *k != i);
         2.0 * fit_cubic(about.map(|k| (time[k] - time[i], q[k] - q[i])), 1.0)[0]
     };
-    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS)
-        .map(jump)
-        .collect();
+    let jumps: Vec<f64> = (JUMP_NEIGHBOURS..q.len() - JUMP_NEIGHBOURS).map(jump).collect();
     // Robust standard deviation of the jump estimates.
     let noise = 1.4826 * median(jumps.iter().map(|x| x.abs()).collect());
     let mut found: Vec<f64> = Vec::new();
@@ -206,17 +194,12 @@ fn backlash_width(time: &[f64], q: &[f64]) -> Option<f64> {
     let middle = median(found.iter().map(|x| x.abs()).collect());
     let low = q.iter().copied().fold(f64::INFINITY, f64::min);
     let travel = q.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low;
-    if middle < BACKLASH_ENCODER_STEPS * encoder_resolution(q)
-        || middle < BACKLASH_TRAVEL_SHARE * travel
-    {
+    if middle < BACKLASH_ENCODER_STEPS * encoder_resolution(q) || middle < BACKLASH_TRAVEL_SHARE * travel {
         return None;
     }
     let is_alike = |x: &&f64| (x.abs() - middle).abs() < BACKLASH_SIZE_TOLERANCE * middle;
     // Neighbouring jumps in opposite directions.
-    let alternate = found
-        .windows(2)
-        .filter(|pair| pair[0] * pair[1] < 0.0)
-        .count();
+    let alternate = found.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
     // Four of five jumps must have the same size, and four of five must change the sign.
     let is_play = found.len() >= BACKLASH_FEWEST_JUMPS
         && 5 * found.iter().filter(is_alike).count() >= BACKLASH_ALIKE_OF_FIVE * found.len()
@@ -269,9 +252,7 @@ mod tests {
         let mut noise = TestNoise::new(3);
         let late: Vec<f64> = time().iter().map(|t| t + 1e-4 * noise.normal()).collect();
         let both = [0, 1].map(|k| {
-            let read: Vec<f64> = (late.iter())
-                .map(|t| motion(*t, k) + 5e-6 * noise.normal())
-                .collect();
+            let read: Vec<f64> = (late.iter()).map(|t| motion(*t, k) + 5e-6 * noise.normal()).collect();
             CubicResidual::new(&time(), &read)
         });
         let found = timing_jitter(&both).unwrap();

@@ -31,11 +31,7 @@ pub struct RobustFit {
 
 /// Fits measured values that are interleaved per sample, `row = sample * channels + channel`; only rows for which
 /// `counts` is true are used. `None` if a number is not finite or no row is used.
-pub fn robust_fit(
-    regressor: &ChannelRegressor,
-    measured: &DVector<f64>,
-    counts: &[bool],
-) -> Option<RobustFit> {
+pub fn robust_fit(regressor: &ChannelRegressor, measured: &DVector<f64>, counts: &[bool]) -> Option<RobustFit> {
     let channels = regressor.channels();
     let mut rest = measured.clone();
     let mut weights = DVector::zeros(measured.len());
@@ -59,16 +55,14 @@ pub fn robust_fit(
             let scale = scale.max(ROUNDING * largest);
             for i in counted() {
                 // Huber's weight: 1 within the bound, bound / |residual| beyond.
-                let within =
-                    (AUDIT_HUBER_BOUND_SIGMAS * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
+                let within = (AUDIT_HUBER_BOUND_SIGMAS * scale / rest[i].abs().max(scale * 1e-9)).min(1.0);
                 weights[i] = within / (scale * scale);
             }
         }
         if weights.iter().all(|weight| *weight == 0.0) {
             return None;
         }
-        let (normal, right) =
-            regressor.normal_equations(&weights, measured, 0..regressor.samples());
+        let (normal, right) = regressor.normal_equations(&weights, measured, 0..regressor.samples());
         let values = solve_normal(normal, &right)?;
         rest = measured - regressor.multiply(values.as_slice());
         found = Some(values);
@@ -90,12 +84,8 @@ pub(super) fn solve_normal(normal: DMatrix<f64>, right: &DVector<f64>) -> Option
 }
 
 /// Factor of normal equations whose columns are scaled to one, with a very small ridge, and the scales.
-pub(super) fn factor_normal(
-    mut normal: DMatrix<f64>,
-) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
-    let scale = normal
-        .diagonal()
-        .map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
+pub(super) fn factor_normal(mut normal: DMatrix<f64>) -> Option<(Cholesky<f64, Dyn>, DVector<f64>)> {
+    let scale = normal.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
     for i in 0..scale.len() {
         for j in 0..scale.len() {
             normal[(i, j)] *= scale[i] * scale[j];

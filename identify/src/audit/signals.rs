@@ -7,10 +7,9 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 
 use super::thresholds::{
-    BEYOND_LIMIT_ONE_IN, EXACT_LIMIT_SHORTEST_RUN, FEWEST_AT_LIMIT, LARGE_ANGLE_RAD,
-    LIMIT_BAND_MOST_SHARE, LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING,
-    NOISY_LIMIT_FEWEST_SAMPLES, NOISY_LIMIT_ONE_IN, PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES,
-    SLOW_UPDATE_SHARE,
+    BEYOND_LIMIT_ONE_IN, EXACT_LIMIT_SHORTEST_RUN, FEWEST_AT_LIMIT, LARGE_ANGLE_RAD, LIMIT_BAND_MOST_SHARE,
+    LIMIT_BAND_SIGMAS, LIMIT_BAND_WIDTHS, LIMIT_CROWDING, NOISY_LIMIT_FEWEST_SAMPLES, NOISY_LIMIT_ONE_IN,
+    PLATEAU_STEEPNESS, SLOW_UPDATE_FEWEST_CHANGES, SLOW_UPDATE_SHARE,
 };
 use crate::recording::{RecordingNote, SignalRecording, sample_place_word};
 use crate::signal::white_noise;
@@ -19,11 +18,7 @@ use crate::words::{count_of, seven_digits, with_digits};
 impl SignalRecording {
     /// Warnings about single signals. `coordinates` are `(name, whether it is an angle)`; columns that cannot be used
     /// are skipped.
-    pub fn signal_notes(
-        &self,
-        coordinates: &[(String, bool)],
-        drives: &[String],
-    ) -> Vec<RecordingNote> {
+    pub fn signal_notes(&self, coordinates: &[(String, bool)], drives: &[String]) -> Vec<RecordingNote> {
         // Positions show whether the mechanism moves.
         let positions: Vec<&[f64]> = coordinates
             .iter()
@@ -44,8 +39,7 @@ impl SignalRecording {
             notes.extend(self.slow_update_note(drive, force));
             // An exact limit is searched first; only without one a noisy limit.
             let saturated = self.saturation_note(drive, force, &positions);
-            notes
-                .extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
+            notes.extend(saturated.or_else(|| self.noisy_saturation_note(drive, force, &positions)));
         }
         notes
     }
@@ -99,12 +93,7 @@ impl SignalRecording {
 
     /// Warning about a force that stays at a limit except for noise, although it reaches and leaves the limit with a
     /// slope.
-    fn noisy_saturation_note(
-        &self,
-        name: &str,
-        force: &[f64],
-        positions: &[&[f64]],
-    ) -> Option<RecordingNote> {
+    fn noisy_saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let n = force.len();
         if n < NOISY_LIMIT_FEWEST_SAMPLES {
             return None;
@@ -149,10 +138,7 @@ impl SignalRecording {
                 // A position differs between both ends of the plateau.
                 let moves = |q: &&[f64]| length > 0 && q[start].total_cmp(&q[i - 1]).is_ne();
                 let is_moving = positions.iter().any(moves);
-                if is_moving
-                    && length >= FEWEST_AT_LIMIT
-                    && steepest * length as f64 > PLATEAU_STEEPNESS * spread
-                {
+                if is_moving && length >= FEWEST_AT_LIMIT && steepest * length as f64 > PLATEAU_STEEPNESS * spread {
                     count += length;
                     first.get_or_insert(start);
                 }
@@ -184,12 +170,7 @@ impl SignalRecording {
 
     /// Warning about a force that stays exactly at its largest or smallest value while the mechanism moves, or is
     /// constant.
-    fn saturation_note(
-        &self,
-        name: &str,
-        force: &[f64],
-        positions: &[&[f64]],
-    ) -> Option<RecordingNote> {
+    fn saturation_note(&self, name: &str, force: &[f64], positions: &[&[f64]]) -> Option<RecordingNote> {
         let low = force.iter().copied().fold(f64::INFINITY, f64::min);
         let high = force.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if low >= high {
@@ -314,9 +295,7 @@ mod tests {
             let t = f64::from(i) * 0.002;
             let _ = writeln!(text, "{t},{},{}", q(t), force(t));
         }
-        let recording =
-            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default())
-                .unwrap();
+        let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
         let notes = recording.signal_notes(&[("q".to_owned(), true)], &["motor".to_owned()]);
         let says = notes.iter().map(|note| note.says.in_library_words());
         says.collect()
@@ -351,10 +330,7 @@ mod tests {
 
     #[test]
     fn a_clipped_force_is_named_with_its_limit_and_line() {
-        let found = says(
-            |t| (3.0 * t).sin(),
-            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
-        );
+        let found = says(|t| (3.0 * t).sin(), |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0));
         assert_eq!(found.len(), 1);
         assert!(
             found[0].contains("stays exactly at 15") && found[0].contains("at -15"),
@@ -364,14 +340,8 @@ mod tests {
             |t| (3.0 * t).sin(),
             |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) + 1e-3 * (9e4 * t).sin(),
         );
-        assert!(
-            found.len() == 1 && found[0].contains("except for noise"),
-            "{found:?}"
-        );
-        let found = says(
-            |t| (3.0 * t).sin(),
-            |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0),
-        );
+        assert!(found.len() == 1 && found[0].contains("except for noise"), "{found:?}");
+        let found = says(|t| (3.0 * t).sin(), |t| (20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0));
         let coarse = |t: f64| ((20.0 * (7.0 * t).sin()).clamp(-15.0, 15.0) / 1.5).round() * 1.5;
         let of_steps = says(|t| (3.0 * t).sin(), coarse);
         assert!(of_steps[0].contains("stays exactly at 15"), "{of_steps:?}");
@@ -390,10 +360,8 @@ mod tests {
                 let (q, rate, acceleration) = (900.0 * sin, 2700.0 * cos, -8100.0 * sin);
                 writeln!(text, "{t},{q},{},{}", scale * rate, scale * acceleration).unwrap();
             }
-            let recording =
-                SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
-            Remedy::options(recording.unwrap().degree_conversion_options("q"))
-                .spell(&LibrarySpelling)
+            let recording = SignalRecording::from_bytes(text.as_bytes(), "run.csv", &ReadOptions::default());
+            Remedy::options(recording.unwrap().degree_conversion_options("q")).spell(&LibrarySpelling)
         };
         assert_eq!(
             of(1.0),
@@ -408,20 +376,13 @@ mod tests {
             |t| (3.0 * (t / 0.008 + 1e-9).floor() * 0.008).sin(),
             |t| (5.0 * t).sin(),
         );
-        assert!(
-            held.len() == 1 && held[0].contains("every 4 samples"),
-            "{held:?}"
-        );
+        assert!(held.len() == 1 && held[0].contains("every 4 samples"), "{held:?}");
         let degrees = says(|t| 90.0 * (3.0 * t).sin(), |t| (5.0 * t).sin());
         assert!(
-            degrees.len() == 1
-                && degrees[0].ends_with("if it is in degrees, use option `columns` = `q=q [deg]`."),
+            degrees.len() == 1 && degrees[0].ends_with("if it is in degrees, use option `columns` = `q=q [deg]`."),
             "{degrees:?}"
         );
         let dead = says(|t| (3.0 * t).sin(), |_| 4.0);
-        assert!(
-            dead.len() == 1 && dead[0].contains("is 4 in every sample"),
-            "{dead:?}"
-        );
+        assert!(dead.len() == 1 && dead[0].contains("is 4 in every sample"), "{dead:?}");
     }
 }

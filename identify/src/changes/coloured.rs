@@ -18,8 +18,8 @@ impl AutoregressiveNoise {
     /// Estimates the process from a residual in segments by the Yule-Walker equations (Levinson-Durbin recursion), with
     /// the order that minimises Schwarz' criterion. `floor` is the rms value of additional white noise, in the unit of
     /// the residual: the residual of a nearly exact model would otherwise be predicted too well.
-    pub fn from_residual(stretches: &[&[f64]], floor: f64) -> Self {
-        let n: usize = stretches.iter().map(|s| s.len()).sum();
+    pub fn from_residual(segments: &[&[f64]], floor: f64) -> Self {
+        let n: usize = segments.iter().map(|s| s.len()).sum();
         let highest = MAX_ORDER.min(n / 20);
         // Autocovariances; products never cross the border of a segment.
         let mut covariance: Vec<f64> = (0..=highest)
@@ -28,7 +28,7 @@ impl AutoregressiveNoise {
                     let later = s.get(lag..).unwrap_or_default();
                     later.iter().zip(s.iter()).map(|(a, b)| a * b).sum()
                 };
-                stretches.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
+                segments.iter().map(of_stretch).sum::<f64>() / n.max(1) as f64
             })
             .collect();
         // White noise adds to the variance only.
@@ -38,9 +38,7 @@ impl AutoregressiveNoise {
         // Levinson-Durbin: each order follows from the one before.
         for order in 0..=highest {
             if order > 0 {
-                let known: f64 = (0..order - 1)
-                    .map(|i| a[i] * covariance[order - 1 - i])
-                    .sum();
+                let known: f64 = (0..order - 1).map(|i| a[i] * covariance[order - 1 - i]).sum();
                 let reflection = (covariance[order] - known) / variance;
                 let before = a.clone();
                 for i in 0..order - 1 {
@@ -102,14 +100,7 @@ mod tests {
         }
         let white = found.whiten(&series);
         let n = white.len() as f64;
-        let product = |lag: usize| -> f64 {
-            white[lag..]
-                .iter()
-                .zip(&white)
-                .map(|(a, b)| a * b)
-                .sum::<f64>()
-                / n
-        };
+        let product = |lag: usize| -> f64 { white[lag..].iter().zip(&white).map(|(a, b)| a * b).sum::<f64>() / n };
         assert!((product(0) - 1.0).abs() < 0.05);
         assert!((1..20).all(|lag| product(lag).abs() < 0.03));
     }
@@ -118,17 +109,9 @@ mod tests {
     fn white_noise_and_nothing_have_no_memory() {
         let mut noise = TestNoise::new(9);
         let white: Vec<f64> = (0..5_000).map(|_| noise.normal()).collect();
-        assert!(
-            AutoregressiveNoise::from_residual(&[&white], 0.0)
-                .coefficients
-                .len()
-                < 3
-        );
+        assert!(AutoregressiveNoise::from_residual(&[&white], 0.0).coefficients.len() < 3);
         let nothing = AutoregressiveNoise::from_residual(&[&[0.0; 100]], 0.0);
-        assert_eq!(
-            (nothing.coefficients.len(), nothing.standard_deviation),
-            (0, 0.0)
-        );
+        assert_eq!((nothing.coefficients.len(), nothing.standard_deviation), (0, 0.0));
         // A wave is foreseen without an error, but not below the floor.
         let wave: Vec<f64> = (0..5_000).map(|i| (0.1 * f64::from(i)).sin()).collect();
         assert!(AutoregressiveNoise::from_residual(&[&wave], 0.0).standard_deviation < 0.01);

@@ -55,10 +55,7 @@ pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointF
     let mut at = JointIterate {
         shared: DVector::zeros(shared.len()),
         scales: vec![1.0; parts.first().map_or(0, |part| part.channels.len())],
-        own: parts
-            .iter()
-            .map(|part| DVector::zeros(part.own.len()))
-            .collect(),
+        own: parts.iter().map(|part| DVector::zeros(part.own.len())).collect(),
     };
     // With fixed scales the problem is linear, so one step is exact.
     let mut step = GaussNewtonStep::new(parts, shared, &at, false);
@@ -68,9 +65,7 @@ pub fn fit_jointly(parts: &[JointRun], shared: &[usize], scaled: bool) -> JointF
             step = GaussNewtonStep::new(parts, shared, &at, true);
             // Shorten the step until the sum of squares falls.
             let tried = [1.0, 0.5, 0.25, 0.1, 0.01].map(|part| step.apply_step(&at, part));
-            let rest = |point: &JointIterate| {
-                GaussNewtonStep::new(parts, shared, point, true).squares_before
-            };
+            let rest = |point: &JointIterate| GaussNewtonStep::new(parts, shared, point, true).squares_before;
             let best = tried.into_iter().find_map(|point| {
                 let left = rest(&point);
                 (left < step.squares_before).then_some((left, point))
@@ -142,11 +137,7 @@ impl GaussNewtonStep {
         let n = next.shared.len();
         next.shared += part * self.solution.values.rows(0, n);
         if self.scaled {
-            for (scale, step) in next
-                .scales
-                .iter_mut()
-                .zip(self.solution.values.iter().skip(n))
-            {
+            for (scale, step) in next.scales.iter_mut().zip(self.solution.values.iter().skip(n)) {
                 *scale += part * step;
             }
         }
@@ -159,21 +150,14 @@ impl GaussNewtonStep {
     /// Values at the point with covariances from the linearised problem.
     fn result(&self, at: &JointIterate) -> JointFit {
         let scales = at.scales.iter().filter(|_| self.scaled);
-        let own = at
-            .own
-            .iter()
-            .zip(&self.own)
-            .map(|(values, one)| JointValues {
-                values: values.clone(),
-                covariance: self.noise * one.covariance(&self.solution.covariance),
-                determined: one.determined_flags(&self.solution.determined),
-            });
+        let own = at.own.iter().zip(&self.own).map(|(values, one)| JointValues {
+            values: values.clone(),
+            covariance: self.noise * one.covariance(&self.solution.covariance),
+            determined: one.determined_flags(&self.solution.determined),
+        });
         JointFit {
             shared: JointValues {
-                values: DVector::from_iterator(
-                    self.solution.values.len(),
-                    at.shared.iter().chain(scales).copied(),
-                ),
+                values: DVector::from_iterator(self.solution.values.len(), at.shared.iter().chain(scales).copied()),
                 covariance: self.noise * &self.solution.covariance,
                 determined: self.solution.determined.clone(),
             },
@@ -233,16 +217,9 @@ mod tests {
     use crate::test_noise::TestNoise;
 
     /// Two channels, two shared columns and one that is a run's own; forces times a scale of each channel.
-    fn part(
-        noise: &mut TestNoise,
-        shared: [f64; 2],
-        own: f64,
-        scales: [f64; 2],
-    ) -> Vec<NormalEquations> {
+    fn part(noise: &mut TestNoise, shared: [f64; 2], own: f64, scales: [f64; 2]) -> Vec<NormalEquations> {
         let channel = |scale: f64| {
-            let z: Vec<Vec<f64>> = (0..3)
-                .map(|_| (0..300).map(|_| noise.normal()).collect())
-                .collect();
+            let z: Vec<Vec<f64>> = (0..3).map(|_| (0..300).map(|_| noise.normal()).collect()).collect();
             let y: Vec<f64> = (0..300)
                 .map(|i| {
                     let force = shared[0] * z[0][i] + shared[1] * z[1][i] + own * z[2][i];
@@ -319,11 +296,7 @@ mod tests {
         let unloaded = part(&mut noise, [2.0, -1.0], 0.0, scales);
         let loaded = part(&mut noise, [2.0, -1.0], 0.5, scales);
         let parts = |mass: &[(usize, f64)]| {
-            [
-                (unloaded.clone(), Vec::new()),
-                (loaded.clone(), mass.to_vec()),
-            ]
-            .map(|(channels, known)| JointRun {
+            [(unloaded.clone(), Vec::new()), (loaded.clone(), mass.to_vec())].map(|(channels, known)| JointRun {
                 channels,
                 own: Vec::new(),
                 known,

@@ -27,7 +27,7 @@ pub use coloured::AutoregressiveNoise;
 pub use joint::{JointFit, JointRun, JointValues, fit_jointly};
 pub use moments::{NormalEquations, NormalSolution};
 pub use search::{
-    ChangeHypotheses, PossibleChange, RunPair, SelectedChange, fit_single_change, search_changes,
-    single_change_gains, within_run_spread,
+    ChangeHypotheses, PossibleChange, RunPair, SelectedChange, fit_single_change, search_changes, single_change_gains,
+    within_run_spread,
 };
 pub use segments::{UncertainValue, change_points, weighted_mean};

@@ -93,9 +93,7 @@ impl NormalEquations {
     #[must_use]
     pub fn select_columns(&self, columns: &[usize]) -> Self {
         Self {
-            gram: DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-                self.gram[(columns[i], columns[j])]
-            }),
+            gram: DMatrix::from_fn(columns.len(), columns.len(), |i, j| self.gram[(columns[i], columns[j])]),
             rhs: DVector::from_fn(columns.len(), |i, _| self.rhs[columns[i]]),
             total: self.total,
             rows: self.rows,
@@ -137,17 +135,11 @@ impl NormalEquations {
         };
         // Undo the scaling; dependent columns have the value 0.
         let of = |i: usize, x: f64| {
-            if kept[i] {
-                divide_by_scale(x, scale[i])
-            } else {
-                0.0
-            }
+            if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 }
         };
         let eliminated = EliminatedValues {
             offset: DVector::from_fn(first, |i, _| of(i, table[(i, n)])),
-            coefficients: DMatrix::from_fn(first, others, |i, j| {
-                of(i, table[(i, first + j)]) * scale[first + j]
-            }),
+            coefficients: DMatrix::from_fn(first, others, |i, j| of(i, table[(i, first + j)]) * scale[first + j]),
             covariance: DMatrix::from_fn(first, first, |i, j| {
                 if kept[j] {
                     divide_by_scale(of(i, table[(i, j)]), scale[j])
@@ -158,18 +150,12 @@ impl NormalEquations {
             determined: (0..first)
                 .map(|i| {
                     // A fixed column that depends on this one makes it undetermined.
-                    let is_free = |k: usize| {
-                        kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE
-                    };
+                    let is_free = |k: usize| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE;
                     kept[i] && (0..first).all(is_free)
                 })
                 .collect(),
             depends_on: (0..first)
-                .map(|i| {
-                    (first..n)
-                        .map(|j| table[(i, j)].abs() > WEAK_DEPENDENCE)
-                        .collect()
-                })
+                .map(|i| (first..n).map(|j| table[(i, j)].abs() > WEAK_DEPENDENCE).collect())
                 .collect(),
             rank: kept.iter().filter(|kept| **kept).count(),
         };
@@ -197,18 +183,11 @@ impl NormalEquations {
         let (mut table, scale) = self.scaled_equations();
         let kept: Vec<bool> = (0..n).map(|k| sweep(&mut table, k)).collect();
         let value = |x: f64, i: usize| {
-            if kept[i] {
-                divide_by_scale(x, scale[i])
-            } else {
-                0.0
-            }
+            if kept[i] { divide_by_scale(x, scale[i]) } else { 0.0 }
         };
         // A column that was fixed is a combination of kept ones, which therefore are not determined.
-        let determined = |i: usize| {
-            kept[i]
-                && (0..n)
-                    .all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE)
-        };
+        let determined =
+            |i: usize| kept[i] && (0..n).all(|k| kept[k] || scale[k] == 0.0 || table[(k, i)].abs() < WEAK_DEPENDENCE);
         NormalSolution {
             values: DVector::from_fn(n, |i, _| value(table[(i, n)], i)),
             covariance: DMatrix::from_fn(n, n, |i, j| {
@@ -257,17 +236,9 @@ impl EliminatedValues {
     /// Which of them are determined, given which of the others are.
     pub(crate) fn determined_flags(&self, others: &[bool]) -> Vec<bool> {
         let is_told = |(alone, hangs): (&bool, &Vec<bool>)| {
-            *alone
-                && hangs
-                    .iter()
-                    .zip(others)
-                    .all(|(hangs, told)| *told || !hangs)
+            *alone && hangs.iter().zip(others).all(|(hangs, told)| *told || !hangs)
         };
-        self.determined
-            .iter()
-            .zip(&self.depends_on)
-            .map(is_told)
-            .collect()
+        self.determined.iter().zip(&self.depends_on).map(is_told).collect()
     }
 
     /// Number of independent columns among the eliminated ones.
@@ -310,11 +281,7 @@ fn sweep(table: &mut DMatrix<f64>, k: usize) -> bool {
     let row: Vec<f64> = (0..n).map(|j| table[(k, j)] / pivot).collect();
     let mut column: Vec<f64> = table.column(k).iter().copied().collect();
     column[k] = 0.0;
-    for (j, factor) in row
-        .iter()
-        .enumerate()
-        .filter(|(j, x)| *j != k && **x != 0.0)
-    {
+    for (j, factor) in row.iter().enumerate().filter(|(j, x)| *j != k && **x != 0.0) {
         for (x, c) in table.column_mut(j).iter_mut().zip(&column) {
             *x -= factor * c;
         }
@@ -336,8 +303,7 @@ mod tests {
     fn sums_of_blocks_give_the_least_squares_of_all_rows() {
         let mut noise = TestNoise::new(3);
         let rows = 200;
-        let column =
-            |noise: &mut TestNoise| -> Vec<f64> { (0..rows).map(|_| noise.normal()).collect() };
+        let column = |noise: &mut TestNoise| -> Vec<f64> { (0..rows).map(|_| noise.normal()).collect() };
         let (a, b) = (column(&mut noise), column(&mut noise));
         let twin: Vec<f64> = a.iter().map(|x| -2.0 * x).collect();
         let y: Vec<f64> = (0..rows)
@@ -362,14 +328,8 @@ mod tests {
             .svd(true, true)
             .solve(&DVector::from_column_slice(&y), 1e-12)
             .unwrap();
-        assert!(
-            (solved.values[0] - expected[0]).abs() < 1e-12
-                && (solved.values[2] - expected[1]).abs() < 1e-12
-        );
-        assert_eq!(
-            (solved.values[1], solved.values[3], solved.rank),
-            (0.0, 0.0, 2)
-        );
+        assert!((solved.values[0] - expected[0]).abs() < 1e-12 && (solved.values[2] - expected[1]).abs() < 1e-12);
+        assert_eq!((solved.values[1], solved.values[3], solved.rank), (0.0, 0.0, 2));
         let inverse = (matrix.transpose() * &matrix).try_inverse().unwrap();
         assert!((solved.covariance[(0, 2)] - inverse[(0, 1)]).abs() < 1e-14);
         assert!((all.residual_squares(&solved.values) - solved.residual_squares).abs() < 1e-9);

@@ -10,8 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::changes::moments::{NormalEquations, NormalSolution, SchurComplement};
 use crate::changes::thresholds::{
-    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO,
-    MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
+    CHANCE_GAIN_RARITY, CHANGE_VALUE_PRICE, MIN_SIGNIFICANCE, MIN_SPREAD_RATIO, MIN_VALIDATION_SHARE, RIVAL_TOLERANCE,
 };
 
 /// Two runs as normal equations of rows with variance 1, block by block and with the same columns.
@@ -89,10 +88,7 @@ pub fn search_changes(runs: &RunPair, search: &ChangeHypotheses) -> Vec<Selected
     }) {
         chosen.remove(at);
     }
-    let mut found: Vec<SelectedChange> = chosen
-        .iter()
-        .map(|g| bench.build_change(&chosen, *g))
-        .collect();
+    let mut found: Vec<SelectedChange> = chosen.iter().map(|g| bench.build_change(&chosen, *g)).collect();
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     found
 }
@@ -107,11 +103,7 @@ pub fn single_change_gains(runs: &RunPair, search: &ChangeHypotheses) -> Vec<f64
 }
 
 /// Fits a single change, however little it explains.
-pub fn fit_single_change(
-    runs: &RunPair,
-    search: &ChangeHypotheses,
-    which: usize,
-) -> SelectedChange {
+pub fn fit_single_change(runs: &RunPair, search: &ChangeHypotheses, which: usize) -> SelectedChange {
     ChangeSelector::new(runs, search).build_change(&[which], which)
 }
 
@@ -142,8 +134,7 @@ pub fn within_run_spread(blocks: &[NormalEquations], search: &ChangeHypotheses) 
         let bench = ChangeSelector::new(&runs, search);
         for (g, candidate) in search.changes.iter().enumerate() {
             // Only the part above what the best of all changes gains by chance.
-            let beyond = bench.squares_gain(&[], g)
-                - chance_gain(candidate.columns.len(), search.changes.len());
+            let beyond = bench.squares_gain(&[], g) - chance_gain(candidate.columns.len(), search.changes.len());
             most = most.max(beyond * bench.noise / worth);
         }
     }
@@ -164,11 +155,7 @@ fn count_rows(blocks: &[NormalEquations]) -> f64 {
 
 /// Effective number of rows of a difference between two runs: half the harmonic mean of both.
 fn effective_rows([a, b]: [f64; 2]) -> f64 {
-    if a > 0.0 && b > 0.0 {
-        a * b / (a + b)
-    } else {
-        0.0
-    }
+    if a > 0.0 && b > 0.0 { a * b / (a + b) } else { 0.0 }
 }
 
 /// Sum of all blocks except one.
@@ -191,11 +178,7 @@ fn remove_index(chosen: &[usize], one: usize) -> Vec<usize> {
 }
 
 /// Normal equations of both runs together: the shared columns, then those of changes, which only the later run has.
-fn stack_runs(
-    [reference, later]: [&NormalEquations; 2],
-    shared: &[usize],
-    columns: &[usize],
-) -> NormalEquations {
+fn stack_runs([reference, later]: [&NormalEquations; 2], shared: &[usize], columns: &[usize]) -> NormalEquations {
     let mut all = later.select_columns(columns);
     let reference = reference.select_columns(shared);
     let n = shared.len();
@@ -233,26 +216,17 @@ struct ChangeSelector<'a> {
 impl<'a> ChangeSelector<'a> {
     /// Eliminates the shared columns and determines noise and prices.
     fn new(runs: &'a RunPair, search: &'a ChangeHypotheses) -> Self {
-        let sums = [
-            sum_except(&runs.reference, None),
-            sum_except(&runs.later, None),
-        ];
+        let sums = [sum_except(&runs.reference, None), sum_except(&runs.later, None)];
         let mut all = sums[0].select_columns(&search.shared);
         all.merge(&sums[1].select_columns(&search.shared));
         // Shared columns that are combinations of others are dropped.
         let telling = all.solve().independent;
         let shared = search.shared.iter().zip(telling);
         let rows = (sums[0].rows + sums[1].rows) as f64;
-        let shared: Vec<usize> = shared
-            .filter(|(_, telling)| *telling)
-            .map(|(k, _)| *k)
-            .collect();
-        let everything = shared
-            .iter()
-            .chain(search.changes.iter().flat_map(|one| &one.columns));
+        let shared: Vec<usize> = shared.filter(|(_, telling)| *telling).map(|(k, _)| *k).collect();
+        let everything = shared.iter().chain(search.changes.iter().flat_map(|one| &one.columns));
         let everything: Vec<usize> = everything.copied().collect();
-        let beside =
-            stack_runs(sums.each_ref(), &shared, &everything).schur_complement(shared.len());
+        let beside = stack_runs(sums.each_ref(), &shared, &everything).schur_complement(shared.len());
         let mut starts = vec![0];
         for candidate in &search.changes {
             starts.push(starts[starts.len() - 1] + candidate.columns.len());
@@ -292,20 +266,13 @@ impl<'a> ChangeSelector<'a> {
     /// Squared residual with some changes, relative to the variance of the noise, and the number of values in their
     /// price.
     fn residual_and_charges(&self, chosen: &[usize]) -> (f64, f64) {
-        let columns = chosen
-            .iter()
-            .flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
-        let (rest, kept) = self
-            .complement
-            .residual_squares(&columns.collect::<Vec<usize>>());
+        let columns = chosen.iter().flat_map(|g| self.starts[*g]..self.starts[*g + 1]);
+        let (rest, kept) = self.complement.residual_squares(&columns.collect::<Vec<usize>>());
         let mut kept = kept.into_iter();
         let charged = chosen.iter().map(|g| {
             let candidate = &self.search.changes[*g];
             let own = kept.by_ref().take(candidate.columns.len());
-            own.filter(|kept| *kept)
-                .count()
-                .min(candidate.max_charged_values) as f64
-                + candidate.rarity
+            own.filter(|kept| *kept).count().min(candidate.max_charged_values) as f64 + candidate.rarity
         });
         let charged = charged.sum();
         (rest / self.noise, charged)
@@ -313,8 +280,7 @@ impl<'a> ChangeSelector<'a> {
 
     /// Decrease of the sum of squares by a further change, relative to the variance of the noise.
     fn squares_gain(&self, chosen: &[usize], further: usize) -> f64 {
-        self.residual_and_charges(chosen).0
-            - self.residual_and_charges(&add_index(chosen, further)).0
+        self.residual_and_charges(chosen).0 - self.residual_and_charges(&add_index(chosen, further)).0
     }
 
     /// Squared residual with some changes plus the price of their values.
@@ -351,10 +317,7 @@ impl<'a> ChangeSelector<'a> {
         let both = add_index(chosen, further);
         let gain = self.squares_gain(chosen, further);
         let mut held_out = 0.0;
-        for (run, blocks) in [&self.runs.reference, &self.runs.later]
-            .into_iter()
-            .enumerate()
-        {
+        for (run, blocks) in [&self.runs.reference, &self.runs.later].into_iter().enumerate() {
             for k in 0..blocks.len() {
                 let others = sum_except(blocks, Some(k));
                 let mut sums = self.sums.each_ref();
@@ -420,9 +383,7 @@ mod tests {
     fn runs(seed: u64, changed: &[(usize, f64)]) -> RunPair {
         let mut noise = TestNoise::new(seed);
         let mut moments = |extra: bool| {
-            let mut z: Vec<Vec<f64>> = (0..7)
-                .map(|_| (0..ROWS).map(|_| noise.normal()).collect())
-                .collect();
+            let mut z: Vec<Vec<f64>> = (0..7).map(|_| (0..ROWS).map(|_| noise.normal()).collect()).collect();
             z[5] = z[0].clone();
             let y: Vec<f64> = (0..ROWS)
                 .map(|i| {
@@ -464,9 +425,7 @@ mod tests {
             let found = search_changes(&runs(seed, &[(5, 1.0), (6, 0.6)]), &possible());
             let which: Vec<usize> = found.iter().map(|c| c.candidate).collect();
             assert_eq!(which, [1, 2], "seed {seed}");
-            let [pair, single] = &found[..] else {
-                unreachable!()
-            };
+            let [pair, single] = &found[..] else { unreachable!() };
             assert!((pair.values[1] - 1.0).abs() < 5.0 * pair.covariance[(1, 1)].sqrt());
             assert!((single.values[0] - 0.6).abs() < 5.0 * single.covariance[(0, 0)].sqrt());
             assert!(pair.determined[1] && single.determined[0]);

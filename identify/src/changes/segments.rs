@@ -52,8 +52,7 @@ pub fn change_points(values: &[Option<UncertainValue>], among: usize) -> Vec<usi
     // Least cost of the values up to each one, and the start of the last segment.
     let mut best: Vec<(f64, usize)> = vec![(-price, 0)];
     for end in 1..=n {
-        let starts = (0..end)
-            .filter(|start| end - start >= SEGMENT_FEWEST_VALUES && best[*start].0.is_finite());
+        let starts = (0..end).filter(|start| end - start >= SEGMENT_FEWEST_VALUES && best[*start].0.is_finite());
         let cost = |start: usize| (best[start].0 + left(start, end) + price, start);
         let least = starts.map(cost).min_by(|a, b| a.0.total_cmp(&b.0));
         best.push(least.unwrap_or((f64::INFINITY, 0)));
@@ -85,9 +84,7 @@ fn drop_outliers(known: &[(usize, UncertainValue)], apart: f64) -> Vec<(usize, U
 /// Mean of some values weighted by their variances, with its standard deviation; `None` if none is known.
 pub fn weighted_mean(values: &[Option<UncertainValue>]) -> Option<UncertainValue> {
     let known = values.iter().flatten().filter(|(_, d)| *d > 0.0);
-    let [w, wx] = known.fold([0.0; 2], |[w, wx], (x, d)| {
-        [w + d.powi(-2), wx + x * d.powi(-2)]
-    });
+    let [w, wx] = known.fold([0.0; 2], |[w, wx], (x, d)| [w + d.powi(-2), wx + x * d.powi(-2)]);
     (w > 0.0).then(|| (wx / w, w.sqrt().recip()))
 }
 
@@ -117,10 +114,7 @@ mod tests {
                 "{seed}: {found:?}"
             );
             let (before, deviation) = weighted_mean(&values[..20]).expect("a mean");
-            assert!(
-                (before - 1e6).abs() < 5.0 * deviation
-                    && (deviation - 0.05_f64.sqrt()).abs() < 1e-12
-            );
+            assert!((before - 1e6).abs() < 5.0 * deviation && (deviation - 0.05_f64.sqrt()).abs() < 1e-12);
         }
     }
 

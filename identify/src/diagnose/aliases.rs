@@ -2,11 +2,9 @@
 //! effects that, in its place, explain the recording equally well.
 
 use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect, n_columns};
-use super::beside::ConditioningSet;
+use super::conditional::ConditioningSet;
 use super::problem::{ColumnSource, LocatedEffect};
-use super::thresholds::{
-    MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO,
-};
+use super::thresholds::{MIN_DISTINCTION, MIN_SUBSTITUTE_SHARE, NEGLIGIBLE_EFFECT_SHARE, SUBSTITUTE_MOST_RATIO};
 
 /// An effect that cannot be distinguished from one that was found.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,17 +42,16 @@ impl EffectSelector<'_> {
             let table = self.projected_gram(picks);
             // Loss of the criterion with another set; `None` if it is distinguishable or does not explain what the
             // effect adds to `fewer`.
-            let in_place =
-                |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
-                    // Squared residual without the effect, and without its partner if `fewer` lacks two.
-                    let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
-                    let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
-                    // An effect that explains nothing cannot be replaced.
-                    let own = left - squares;
-                    let stands_in = own > NEGLIGIBLE_EFFECT_SHARE * left
-                        && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
-                    (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
-                };
+            let in_place = |bench: &Self, fewer: &[SelectedEffect], trial: &ScoredEffectSet| -> Option<f64> {
+                // Squared residual without the effect, and without its partner if `fewer` lacks two.
+                let left = bench.fit_from_gram(&table, fewer.to_vec()).squares;
+                let worse = worth * (trial.squares / squares.max(f64::MIN_POSITIVE)).ln();
+                // An effect that explains nothing cannot be replaced.
+                let own = left - squares;
+                let stands_in =
+                    own > NEGLIGIBLE_EFFECT_SHARE * left && left - trial.squares > MIN_SUBSTITUTE_SHARE * own;
+                (worse < MIN_DISTINCTION && stands_in && trial.is_possible()).then_some(worse)
+            };
             let mut found: Vec<EffectAlias> = Vec::new();
             // Stage 1: single candidates in place of the effect.
             for candidate in self.current_choices.clone().iter().flatten() {
@@ -63,10 +60,7 @@ impl EffectSelector<'_> {
                 }
                 // The same kind at more or fewer places is another form of the set.
                 // Kind and place of the effect and of the candidate.
-                let (one, two) = (
-                    &self.candidate(&pick).effect,
-                    &self.candidate(candidate).effect,
-                );
+                let (one, two) = (&self.candidate(&pick).effect, &self.candidate(candidate).effect);
                 if one.kind == two.kind && one.at.iter().any(|place| two.at.contains(place)) {
                     continue;
                 }
@@ -76,9 +70,7 @@ impl EffectSelector<'_> {
                     continue; // It holds the found one and more, so that nothing speaks for it.
                 }
                 // A curve with a searched constant approximates almost any curve without one.
-                if self.candidate(candidate).searched_constants
-                    > self.candidate(&pick).searched_constants
-                {
+                if self.candidate(candidate).searched_constants > self.candidate(&pick).searched_constants {
                     continue;
                 }
                 // Fit the candidate in place of the effect.
@@ -170,18 +162,10 @@ impl EffectSelector<'_> {
 
     /// A set with a force signal fault or a body that is nearly as good, fitted again with columns at the estimated
     /// values.
-    fn refit_at_size(
-        &mut self,
-        candidate: &SelectedEffect,
-        tried: ScoredEffectSet,
-        squares: f64,
-    ) -> ScoredEffectSet {
+    fn refit_at_size(&mut self, candidate: &SelectedEffect, tried: ScoredEffectSet, squares: f64) -> ScoredEffectSet {
         let source = &self.candidate(candidate).source;
         // Only these have columns that change with their estimates.
-        let is_sized = matches!(
-            source,
-            ColumnSource::ReadingFault(_) | ColumnSource::Body(_)
-        );
+        let is_sized = matches!(source, ColumnSource::ReadingFault(_) | ColumnSource::Body(_));
         if !is_sized || tried.squares > SUBSTITUTE_MOST_RATIO * squares {
             return tried;
         }

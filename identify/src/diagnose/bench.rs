@@ -6,14 +6,13 @@ use std::collections::{HashMap, HashSet};
 
 use nalgebra::{DMatrix, DVector};
 
-use super::beside::ConditioningSet;
 use super::column::ForceColumn;
+use super::conditional::ConditioningSet;
 use super::factored::GramFactor;
 use super::noise::effective_samples;
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::{
-    CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
-    SignConstraint,
+    CandidateEffect, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter, SignConstraint,
 };
 use super::thresholds::{CANCELLATION_SHARE, RANDOM_SIGN_SHARE};
 
@@ -91,16 +90,14 @@ pub(crate) struct EffectSelector<'a> {
 impl<'a> EffectSelector<'a> {
     /// Fills the pool with the known columns and sets the first weights.
     pub(crate) fn new(problem: &'a DiagnosisProblem, supply: &'a dyn ColumnProvider) -> Self {
-        let mut pool =
-            ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
+        let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
         let base = problem.base.iter().map(|c| pool.add(c)).collect();
         pool.prior_equations.clone_from(&problem.prior);
         let measured = pool.add(&problem.measured);
         let zero = pool.add(ForceColumn(vec![None; problem.layout.channels.len()]));
         let friction = problem.friction.iter().map(|c| pool.add(c)).collect();
         // Known columns enter the pool once, for every choice of the constants.
-        let mut of_choice =
-            |choice: &'a ColumnChoice| choice.columns.iter().map(|c| pool.add(c)).collect();
+        let mut of_choice = |choice: &'a ColumnChoice| choice.columns.iter().map(|c| pool.add(c)).collect();
         let of_candidate = |candidate: &'a CandidateEffect| match &candidate.source {
             ColumnSource::Columns(choices) => choices.iter().map(&mut of_choice).collect(),
             _ => Vec::new(),
@@ -164,11 +161,7 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// Residual of some effects with given factors, `[channel][sample]`.
-    pub(crate) fn residual(
-        &self,
-        picks: &[SelectedEffect],
-        factors: &DVector<f64>,
-    ) -> Vec<Vec<f64>> {
+    pub(crate) fn residual(&self, picks: &[SelectedEffect], factors: &DVector<f64>) -> Vec<Vec<f64>> {
         self.pool
             .residual(self.measured, &self.columns(picks), factors.as_slice())
     }
@@ -194,9 +187,9 @@ impl<'a> EffectSelector<'a> {
         let mut worth = 0.0;
         for d in channels {
             let mut start = 0;
-            for stretch in &self.problem.layout.segments {
-                worth += effective_samples(&rest[*d][start..start + stretch.samples]);
-                start += stretch.samples;
+            for segment in &self.problem.layout.segments {
+                worth += effective_samples(&rest[*d][start..start + segment.samples]);
+                start += segment.samples;
             }
         }
         worth.max(2.0)
@@ -220,8 +213,7 @@ impl<'a> EffectSelector<'a> {
         let candidates = problem.candidates.iter().enumerate();
         let mut asked = candidates.clone().filter(|(k, _)| is_asked(*k));
         // Load-dependent columns of all candidates come from one evaluation.
-        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent)
-        {
+        let carried = if asked.any(|(_, candidate)| candidate.source == ColumnSource::LoadDependent) {
             self.load_dependent_effects(picks)
         } else {
             HashMap::new()
@@ -238,9 +230,7 @@ impl<'a> EffectSelector<'a> {
                     .best_choice(k, &beside)
                     .map(|(best, _)| self.select_choice(k, best)),
                 // Columns that were added at the start, since the effect is not selected yet.
-                ColumnSource::Body(_) | ColumnSource::Constant(_)
-                    if picks.iter().all(|p| p.candidate != k) =>
-                {
+                ColumnSource::Body(_) | ColumnSource::Constant(_) if picks.iter().all(|p| p.candidate != k) => {
                     Some(SelectedEffect {
                         candidate: k,
                         constants: Vec::new(),
@@ -252,9 +242,7 @@ impl<'a> EffectSelector<'a> {
                 ColumnSource::Tilt(_)
                 | ColumnSource::ReadingFault(_)
                 | ColumnSource::Body(_)
-                | ColumnSource::Constant(_) => {
-                    Some(self.linearise_model_change(k, picks, &beside.factors))
-                }
+                | ColumnSource::Constant(_) => Some(self.linearise_model_change(k, picks, &beside.factors)),
                 ColumnSource::LoadDependent => carried.get(&k).cloned(),
             };
             // Candidates whose columns are combinations of those of the set explain nothing new.
@@ -268,11 +256,7 @@ impl<'a> EffectSelector<'a> {
 
     /// The choice of a candidate that explains most in addition to a set, and how much; a single choice is returned
     /// with 0 without a test.
-    pub(crate) fn best_choice(
-        &self,
-        candidate: usize,
-        beside: &ConditioningSet,
-    ) -> Option<(usize, f64)> {
+    pub(crate) fn best_choice(&self, candidate: usize, beside: &ConditioningSet) -> Option<(usize, f64)> {
         let choices = &self.choices[candidate];
         if choices.len() == 1 {
             return Some((0, 0.0));
@@ -320,9 +304,7 @@ impl<'a> EffectSelector<'a> {
             let several = |i: usize| {
                 let columns = picks[i].columns.iter().filter(|k| **k != self.zero);
                 let candidate = self.candidate(&picks[i]);
-                candidate.refines.is_none()
-                    && candidate.searched_constants == 0
-                    && columns.count() > 1
+                candidate.refines.is_none() && candidate.searched_constants == 0 && columns.count() > 1
             };
             // Set one parameter with a wrong sign to zero and fit again, as long as the residual allows it.
             let wrong = self.wrong_parameters(&picks, factors.as_slice());
@@ -347,12 +329,7 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// Assembles a scored set from factors of base and effects; `squares` is its weighted squared residual.
-    fn score_set(
-        &self,
-        picks: Vec<SelectedEffect>,
-        factors: &[f64],
-        squares: f64,
-    ) -> ScoredEffectSet {
+    fn score_set(&self, picks: Vec<SelectedEffect>, factors: &[f64], squares: f64) -> ScoredEffectSet {
         let wrong = self.wrong_parameters(&picks, factors);
         let mut wrong_sign: Vec<usize> = wrong.into_iter().map(|(i, _)| i).collect();
         wrong_sign.dedup();
@@ -423,11 +400,7 @@ impl<'a> EffectSelector<'a> {
                 SignConstraint::Any => false,
             };
             let of_pick = parameters.iter().zip(own).map(is_wrong).enumerate();
-            wrong.extend(
-                of_pick
-                    .filter(|(_, is_wrong)| *is_wrong)
-                    .map(|(j, _)| (i, j)),
-            );
+            wrong.extend(of_pick.filter(|(_, is_wrong)| *is_wrong).map(|(j, _)| (i, j)));
             if let ColumnSource::Body(body) = &self.candidate(pick).source
                 && body.is_out_of_reach(own)
             {
@@ -479,11 +452,7 @@ impl<'a> EffectSelector<'a> {
     }
 
     /// Fits a set of effects by a table that contains its columns.
-    pub(crate) fn fit_from_gram(
-        &self,
-        table: &ProjectedGram,
-        picks: Vec<SelectedEffect>,
-    ) -> ScoredEffectSet {
+    pub(crate) fn fit_from_gram(&self, table: &ProjectedGram, picks: Vec<SelectedEffect>) -> ScoredEffectSet {
         self.fit_with_signs(picks, |picks| {
             let mut which: Vec<usize> = picks
                 .iter()

@@ -29,11 +29,7 @@ pub(crate) struct ExtensionBound<'a> {
 
 impl EffectSelector<'_> {
     /// Prepares a set; the table must contain its columns and those that may be added.
-    pub(crate) fn extension_bound<'a>(
-        &self,
-        table: &'a ProjectedGram,
-        set: &[SelectedEffect],
-    ) -> ExtensionBound<'a> {
+    pub(crate) fn extension_bound<'a>(&self, table: &'a ProjectedGram, set: &[SelectedEffect]) -> ExtensionBound<'a> {
         let columns = set.iter().flat_map(|pick| &pick.columns);
         let places: Vec<usize> = columns.map(|k| table.row_of_column[*k]).collect();
         let n = places.len();
@@ -54,12 +50,7 @@ impl EffectSelector<'_> {
     }
 
     /// Lower bound of the criterion of a set with further effects, with `worth` independent equations.
-    pub(crate) fn least_criterion(
-        &self,
-        beyond: &ExtensionBound<'_>,
-        further: &[&SelectedEffect],
-        worth: f64,
-    ) -> f64 {
+    pub(crate) fn least_criterion(&self, beyond: &ExtensionBound<'_>, further: &[&SelectedEffect], worth: f64) -> f64 {
         let squares = beyond.least_squares(further.iter().flat_map(|pick| &pick.columns));
         let more: usize = further.iter().map(|pick| self.fewest_freedoms(pick)).sum();
         let freedoms = (beyond.freedoms + more) as f64;
@@ -69,10 +60,7 @@ impl EffectSelector<'_> {
     /// Least number of estimated values in an effect: parameters with the wrong sign may be set to zero.
     fn fewest_freedoms(&self, pick: &SelectedEffect) -> usize {
         let candidate = self.candidate(pick);
-        let has_sign = candidate
-            .parameters
-            .iter()
-            .any(|p| p.sign != SignConstraint::Any);
+        let has_sign = candidate.parameters.iter().any(|p| p.sign != SignConstraint::Any);
         let is_body = matches!(candidate.source, ColumnSource::Body(_));
         let may_lose = candidate.refines.is_none() && candidate.searched_constants == 0;
         // One estimated number is the least that remains.
@@ -140,8 +128,8 @@ impl ExtensionBound<'_> {
 mod tests {
     use super::super::column::ForceColumn;
     use super::super::problem::{
-        CandidateEffect, CandidateNature, ColumnChoice, DiagnosisProblem, EffectParameter,
-        LocatedEffect, NoColumnProvider, SampleLayout, SampleSegment,
+        CandidateEffect, CandidateNature, ColumnChoice, DiagnosisProblem, EffectParameter, LocatedEffect,
+        NoColumnProvider, SampleLayout, SampleSegment,
     };
     use super::super::search::criterion;
     use super::*;
@@ -208,8 +196,7 @@ mod tests {
         };
         let mut bench = EffectSelector::new(&problem, &NoColumnProvider);
         bench.update_choices(&[]);
-        let present: Vec<SelectedEffect> =
-            bench.current_choices.iter().flatten().cloned().collect();
+        let present: Vec<SelectedEffect> = bench.current_choices.iter().flatten().cloned().collect();
         let table = bench.projected_gram(&[]);
         let worth = 100.0;
         let mut near = 0;

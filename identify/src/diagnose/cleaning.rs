@@ -9,10 +9,9 @@ use super::hum::{self, SlowSpectralLine};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
 use super::thresholds::{
-    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE,
-    QUANTISED_FEWEST_REPEATS, QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART,
-    QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES, REVERSAL_UNDECIDED_SAMPLES,
-    REVERSALS_MOST_SHARE,
+    FORCE_OUTLIER_DEVIATIONS, OUTLIER_LEAST_FORCE_SHARE, OUTLIERS_MOST_SHARE, QUANTISED_FEWEST_REPEATS,
+    QUANTISED_FEWEST_VALUES, QUANTISED_LEAST_NOISE_PART, QUANTISED_MOST_OFF_STEP, REVERSAL_OUTLIER_SAMPLES,
+    REVERSAL_UNDECIDED_SAMPLES, REVERSALS_MOST_SHARE,
 };
 use crate::signal::median;
 
@@ -31,15 +30,10 @@ pub(crate) fn clean_forces(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
 
 /// Removes slow spectral lines from forces that have not been cleaned, then cleans the rest, and reports all. In this
 /// order, since the crests of an unknown line would be taken for outliers.
-pub(crate) fn clean_with_slow_lines(
-    problem: &mut DiagnosisProblem,
-    slow: &[SlowSpectralLine],
-) -> Vec<Disturbance> {
+pub(crate) fn clean_with_slow_lines(problem: &mut DiagnosisProblem, slow: &[SlowSpectralLine]) -> Vec<Disturbance> {
     let mut found = count_removed_squares(problem, |problem| {
         let lines = slow.iter();
-        lines
-            .filter_map(|line| line.remove_from_force(problem))
-            .collect()
+        lines.filter_map(|line| line.remove_from_force(problem)).collect()
     });
     found.extend(clean_forces(problem));
     found
@@ -72,11 +66,7 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
     let columns = problem.base.iter().chain(&problem.friction);
     let mut which: Vec<usize> = columns.map(|c| pool.add(c)).collect();
     let measured = pool.add(&problem.measured);
-    let size = |values: &Option<Vec<f64>>| {
-        values
-            .as_ref()
-            .map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64)
-    };
+    let size = |values: &Option<Vec<f64>>| values.as_ref().map_or(0.0, |v| dot(v, v) / v.len().max(1) as f64);
     // First weights from the size of the forces.
     let weight = |values: &Option<Vec<f64>>| 1.0 / size(values).max(f64::MIN_POSITIVE);
     let mut weights: Vec<f64> = problem.measured.0.iter().map(weight).collect();
@@ -97,8 +87,7 @@ fn base_residual(problem: &DiagnosisProblem) -> Vec<Vec<f64>> {
 
 /// Replaces outliers by the median of their neighbours and reports their share and rms size per channel.
 fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
-    let mut flagged: Vec<Vec<bool>> =
-        vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
+    let mut flagged: Vec<Vec<bool>> = vec![vec![false; problem.layout.samples()]; problem.layout.channels.len()];
     // Distances of the outliers of each channel, for the report.
     let mut sizes: Vec<Vec<f64>> = vec![Vec::new(); flagged.len()];
     // Large outliers hide smaller ones, so the search is repeated.
@@ -113,8 +102,7 @@ fn remove_outliers(problem: &mut DiagnosisProblem) -> Vec<Disturbance> {
             let spread = 1.4826 * median(apart.iter().map(|x| x.abs()).collect());
             let force = problem.measured_force(d);
             let size = (dot(&force, &force) / force.len().max(1) as f64).sqrt();
-            let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d]))
-                .max(OUTLIER_LEAST_FORCE_SHARE * size);
+            let bound = (FORCE_OUTLIER_DEVIATIONS * spread.max(problem.noise[d])).max(OUTLIER_LEAST_FORCE_SHARE * size);
             let new: Vec<usize> = (0..rest.len())
                 .filter(|i| apart[*i].abs() > bound && !reverses[*i])
                 .collect();
@@ -179,15 +167,15 @@ fn reversal_samples(problem: &DiagnosisProblem, channel: usize, samples: usize) 
 fn deviation_from_neighbours(problem: &DiagnosisProblem, rest: &[f64]) -> Vec<f64> {
     let mut apart = Vec::with_capacity(rest.len());
     let mut start = 0;
-    for stretch in &problem.layout.segments {
-        let part = &rest[start..start + stretch.samples];
+    for segment in &problem.layout.segments {
+        let part = &rest[start..start + segment.samples];
         for i in 0..part.len() {
             // The window is shifted at the ends of a segment.
             let low = i.saturating_sub(NEIGHBOURS / 2);
             let high = (low + NEIGHBOURS).min(part.len());
             apart.push(part[i] - median(part[low..high].to_vec()));
         }
-        start += stretch.samples;
+        start += segment.samples;
     }
     apart
 }
@@ -201,16 +189,13 @@ pub fn quantisation_step(values: &[f64], noise: f64) -> Option<f64> {
     let largest = sorted.first()?.abs().max(sorted.last()?.abs());
     sorted.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * largest);
     // Quantised values repeat; many different values mean a fine resolution.
-    if sorted.len() < QUANTISED_FEWEST_VALUES
-        || QUANTISED_FEWEST_REPEATS * sorted.len() > values.len()
-    {
+    if sorted.len() < QUANTISED_FEWEST_VALUES || QUANTISED_FEWEST_REPEATS * sorted.len() > values.len() {
         return None;
     }
     let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]);
     // The smallest difference is the step, if all others are multiples of it.
     let step = gaps.fold(f64::INFINITY, f64::min);
-    let is_multiple =
-        |gap: f64| (gap / step - (gap / step).round()).abs() < QUANTISED_MOST_OFF_STEP;
+    let is_multiple = |gap: f64| (gap / step - (gap / step).round()).abs() < QUANTISED_MOST_OFF_STEP;
     let all = sorted.windows(2).all(|pair| is_multiple(pair[1] - pair[0]));
     // A quantisation step q adds an error of standard deviation q / sqrt(12).
     (all && step / 12.0_f64.sqrt() > QUANTISED_LEAST_NOISE_PART * noise).then_some(step)
@@ -236,16 +221,9 @@ impl DiagnosisProblem {
     /// Samples that decide nothing, `[channel][sample]`: those left out and those next to reversals.
     pub(crate) fn undecided_samples(&self) -> Vec<Vec<bool>> {
         let of = |d: usize| {
-            let out = |all: &[Vec<bool>], i: usize| {
-                all.get(d)
-                    .and_then(|out| out.get(i))
-                    .copied()
-                    .unwrap_or(false)
-            };
+            let out = |all: &[Vec<bool>], i: usize| all.get(d).and_then(|out| out.get(i)).copied().unwrap_or(false);
             let samples = 0..self.layout.samples();
-            samples
-                .map(|i| out(&self.left_out, i) || out(&self.jumps, i))
-                .collect()
+            samples.map(|i| out(&self.left_out, i) || out(&self.jumps, i)).collect()
         };
         (0..self.layout.channels.len()).map(of).collect()
     }
@@ -292,11 +270,7 @@ mod tests {
     #[test]
     fn noise_has_neither_outliers_nor_lines() {
         for seed in 0..40 {
-            assert_eq!(
-                clean_forces(&mut problem(seed, |_, _| 0.0)),
-                [],
-                "seed {seed}"
-            );
+            assert_eq!(clean_forces(&mut problem(seed, |_, _| 0.0)), [], "seed {seed}");
         }
     }
 

@@ -18,10 +18,7 @@ impl ConstantCorrection {
     /// change up to the third power. `base` are the factors of the base columns.
     pub(crate) fn secant_column(&self, error: f64, base: &[f64], channels: usize) -> ForceColumn {
         let mut sum = ForceColumn(vec![None; channels]);
-        for (part, share) in [
-            (&self.first_derivative, 1.0),
-            (&self.second_derivative, 0.5 * error),
-        ] {
+        for (part, share) in [(&self.first_derivative, 1.0), (&self.second_derivative, 0.5 * error)] {
             if share == 0.0 {
                 continue;
             }

@@ -183,10 +183,7 @@ impl DiagnosisProblem {
         let mut force = self.measured.0[channel]
             .clone()
             .unwrap_or_else(|| vec![0.0; self.layout.samples()]);
-        let held = self
-            .fixed_forces
-            .as_ref()
-            .and_then(|held| held.0[channel].as_ref());
+        let held = self.fixed_forces.as_ref().and_then(|held| held.0[channel].as_ref());
         for (sum, x) in force.iter_mut().zip(held.into_iter().flatten()) {
             *sum += x;
         }

@@ -3,8 +3,8 @@
 
 use super::column::ForceColumn;
 use super::problem::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
-    EffectParameter, LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, LocatedEffect,
+    SignConstraint,
 };
 
 /// Candidates for a drift of the offset and of the friction of every channel; `units` are those of the forces,
@@ -15,10 +15,7 @@ pub fn drift_candidates(problem: &DiagnosisProblem, units: &[String]) -> Vec<Can
     let mut recordings: Vec<&str> = layout.segments.iter().map(|s| s.name.as_str()).collect();
     recordings.dedup();
     // Level and ramp of each recording.
-    let ramps: Vec<[Vec<f64>; 2]> = recordings
-        .iter()
-        .map(|name| recording_ramp(problem, name))
-        .collect();
+    let ramps: Vec<[Vec<f64>; 2]> = recordings.iter().map(|name| recording_ramp(problem, name)).collect();
     let mut candidates = Vec::new();
     for (d, channel) in layout.channels.iter().enumerate() {
         // Friction column of one channel times a function of time.
@@ -105,10 +102,10 @@ fn recording_ramp(problem: &DiagnosisProblem, recording: &str) -> [Vec<f64>; 2] 
     let last = samples.saturating_sub(1).max(1) as f64;
     let mut at = 0.0;
     let [mut level, mut ramp] = [(); 2].map(|()| Vec::with_capacity(problem.layout.samples()));
-    for stretch in stretches {
-        for _ in 0..stretch.samples {
+    for segment in stretches {
+        for _ in 0..segment.samples {
             // Outside of the recording both functions are zero.
-            let is_in = stretch.name == recording;
+            let is_in = segment.name == recording;
             level.push(f64::from(u8::from(is_in)));
             ramp.push(if is_in { at / last - 0.5 } else { 0.0 });
             at += f64::from(u8::from(is_in));

@@ -9,18 +9,13 @@ use nalgebra::DMatrix;
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::FitScope;
 use super::thresholds::{
-    ESTIMATE_MOST_VARIANCE_RATIO, MAX_LOG_ODDS, UNKNOWN_CAUSE_IF_UNEXPLAINED,
-    UNKNOWN_CAUSE_PROBABILITY,
+    ESTIMATE_MOST_VARIANCE_RATIO, MAX_LOG_ODDS, UNKNOWN_CAUSE_IF_UNEXPLAINED, UNKNOWN_CAUSE_PROBABILITY,
 };
 
 impl EffectSelector<'_> {
     /// Estimates of each member's parameters with their standard deviations, `[effect][parameter]`; the deviation is
     /// `None` if other columns explain the same. Each channel counts with its effective number of samples.
-    pub(crate) fn estimate_parameters(
-        &self,
-        picks: &[SelectedEffect],
-        on: FitScope,
-    ) -> Vec<Vec<(f64, Option<f64>)>> {
+    pub(crate) fn estimate_parameters(&self, picks: &[SelectedEffect], on: FitScope) -> Vec<Vec<(f64, Option<f64>)>> {
         let which = self.columns(picks);
         let (factors, _) = self.fit(picks, on);
         let rest = self.residual(picks, &factors);
@@ -49,9 +44,7 @@ impl EffectSelector<'_> {
                 let variance = inverse.as_ref().map_or(f64::NAN, |inverse| inverse[(k, k)]);
                 let deviation = variance.sqrt() / scale[k];
                 // An estimate whose uncertainty is far above what its column alone would give is not determined.
-                let is_known = deviation.is_finite()
-                    && variance < ESTIMATE_MOST_VARIANCE_RATIO
-                    && factors[k] != 0.0;
+                let is_known = deviation.is_finite() && variance < ESTIMATE_MOST_VARIANCE_RATIO && factors[k] != 0.0;
                 (factors[k], is_known.then_some(deviation))
             };
             all.push((at..at + pick.columns.len()).map(of).collect());

@@ -23,9 +23,9 @@ use serde::Serialize;
 use super::bench::{EffectSelector, SelectedEffect};
 use super::pool::{FitScope, dot, solve_gram};
 use super::thresholds::{
-    BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, LARGE_GAIN, LEAST_GAIN, LEAST_SHARES_T,
-    MIN_SHARE_OF_FORCE, MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T,
-    WHITE_LEAST_EFFECTIVE_SHARE, WHITE_MOST_NOISE_RATIO,
+    BLOCKS_LEAST_T, EXPLICABLE_LEAST_NOISE_RATIO, LARGE_GAIN, LEAST_GAIN, LEAST_SHARES_T, MIN_SHARE_OF_FORCE,
+    MIN_SHARE_OF_OTHERS, NOISE_LEAST_GAIN_VARIANCES, NOISE_LEAST_T, WHITE_LEAST_EFFECTIVE_SHARE,
+    WHITE_MOST_NOISE_RATIO,
 };
 
 /// Number of blocks into which the error of a segment is divided.
@@ -63,9 +63,7 @@ impl SelectionEvidence {
 
     /// Whether a change that was accepted before is worth keeping.
     pub(crate) fn is_worth_keeping(&self) -> bool {
-        let is_large = self.gain >= LARGE_GAIN
-            && self.bic > 0.0
-            && self.above_noise > EXPLICABLE_LEAST_NOISE_RATIO;
+        let is_large = self.gain >= LARGE_GAIN && self.bic > 0.0 && self.above_noise > EXPLICABLE_LEAST_NOISE_RATIO;
         self.is_sufficient() || is_large
     }
 
@@ -118,11 +116,9 @@ impl EffectSelector<'_> {
             channels.iter().map(of).sum()
         };
         let [old_squares, new_squares] = [squares(&old_rest), squares(&new_rest)];
-        let is_noise_known = self.is_white(&new_rest, channels)
-            && self.is_above_fit_error(before, old_squares - new_squares, channels);
-        let held_out = |by_folds: bool| {
-            [before, after].map(|picks| self.validation_errors(picks, channels, by_folds))
-        };
+        let is_noise_known =
+            self.is_white(&new_rest, channels) && self.is_above_fit_error(before, old_squares - new_squares, channels);
+        let held_out = |by_folds: bool| [before, after].map(|picks| self.validation_errors(picks, channels, by_folds));
         let is_per_run = |pick: &SelectedEffect| self.candidate(pick).is_per_run;
         let mut compared = held_out(before.iter().chain(after).any(is_per_run));
         // If the residual is white noise and the validation runs support the change, they join the fit: both together
@@ -154,15 +150,12 @@ impl EffectSelector<'_> {
         let worth = self.effective_equations(&new_rest, channels);
         // The best of many candidates fits the noise better than a single one, so the price grows with their number.
         let choices = (self.problem.candidates.len().max(1) as f64).ln();
-        let price = |picks: &[SelectedEffect]| {
-            count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices
-        };
+        let price = |picks: &[SelectedEffect]| count(picks) * worth.ln() + 2.0 * picks.len() as f64 * choices;
         SelectionEvidence {
             gain: if total > 0.0 { n * mean / total } else { 0.0 },
             blocks_t: t,
             shares_t,
-            bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln()
-                - (price(after) - price(before)),
+            bic: worth * (old_squares / new_squares.max(f64::MIN_POSITIVE)).ln() - (price(after) - price(before)),
             effective_samples: worth,
             above_noise: self.squares_over_noise(&old_rest, channels),
             least_gain: {
@@ -222,12 +215,7 @@ impl EffectSelector<'_> {
     /// Weighted squared errors of some channels in blocks to which the set was not fitted, one per block: the blocks of
     /// the validation runs, or each fold of all recordings if there are none or if recordings have parameters of their
     /// own.
-    pub(crate) fn validation_errors(
-        &self,
-        picks: &[SelectedEffect],
-        channels: &[usize],
-        by_folds: bool,
-    ) -> Vec<f64> {
+    pub(crate) fn validation_errors(&self, picks: &[SelectedEffect], channels: &[usize], by_folds: bool) -> Vec<f64> {
         let layout = &self.problem.layout;
         let square = |rest: &[Vec<f64>], range: &std::ops::Range<usize>| -> f64 {
             let of = |d: &usize| {

@@ -12,9 +12,8 @@ use super::disturbance::{Disturbance, EstimatedQuantity, is_white};
 use super::pool::{ColumnPool, FitScope, dot, solve_gram};
 use super::problem::DiagnosisProblem;
 use super::thresholds::{
-    LINE_LOW_HZ, LINE_LOWEST_HZ, LINE_MAIN_SHARE, MIN_LINE_RATIO, MIN_LINE_SHARE, MOST_LINES,
-    SLOW_LINE_LEAST_PERIODS, SLOW_LINE_LEAST_SEGMENT_SHARE, SLOW_LINE_MOST_REMAINING_SHARE,
-    SLOW_LINE_PARTS,
+    LINE_LOW_HZ, LINE_LOWEST_HZ, LINE_MAIN_SHARE, MIN_LINE_RATIO, MIN_LINE_SHARE, MOST_LINES, SLOW_LINE_LEAST_PERIODS,
+    SLOW_LINE_LEAST_SEGMENT_SHARE, SLOW_LINE_MOST_REMAINING_SHARE, SLOW_LINE_PARTS,
 };
 use crate::signal::{hann_power, median};
 
@@ -47,17 +46,12 @@ pub(crate) fn remove_lines(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) ->
         let mut without = left.clone();
         for (d, left) in without.iter_mut().enumerate() {
             // Samples that were not measured stay as they are.
-            let lost = problem
-                .layout
-                .left_out
-                .get(d)
-                .map_or(&[][..], Vec::as_slice);
+            let lost = problem.layout.left_out.get(d).map_or(&[][..], Vec::as_slice);
             subtract_sinusoid(problem, left, &unfit[d], lost, frequency);
         }
         // Whether the line is most of the residual of a channel.
-        let is_most = |(before, after): (&Vec<f64>, &Vec<f64>)| {
-            dot(after, after) < (1.0 - LINE_MAIN_SHARE) * dot(before, before)
-        };
+        let is_most =
+            |(before, after): (&Vec<f64>, &Vec<f64>)| dot(after, after) < (1.0 - LINE_MAIN_SHARE) * dot(before, before);
         // A line at a low frequency that is not most of a residual comes from the motion; look above that range only.
         if frequency < LINE_LOW_HZ && !left.iter().zip(&without).any(is_most) {
             lowest = LINE_LOW_HZ;
@@ -120,21 +114,13 @@ pub(crate) fn slow_lines(
             continue;
         };
         let own = std::slice::from_ref(own);
-        let frequency = refine_frequency(
-            problem,
-            own,
-            std::slice::from_ref(&unfit[channel]),
-            frequency,
-        );
-        let Some((frequency, wave)) =
-            SinusoidFitter::new(problem, rest, channel).find_sinusoid(frequency)
-        else {
+        let frequency = refine_frequency(problem, own, std::slice::from_ref(&unfit[channel]), frequency);
+        let Some((frequency, wave)) = SinusoidFitter::new(problem, rest, channel).find_sinusoid(frequency) else {
             continue;
         };
         // In a channel with unexplained repeatable residual, a line must leave less than half of the non-repeatable
         // part.
-        let explains_more =
-            dot(&wave.residual, &wave.residual) < SLOW_LINE_MOST_REMAINING_SHARE * by_no_state;
+        let explains_more = dot(&wave.residual, &wave.residual) < SLOW_LINE_MOST_REMAINING_SHARE * by_no_state;
         if explains_more || !unexplained.contains(&channel) {
             found.push(SlowSpectralLine {
                 channel,
@@ -175,8 +161,7 @@ struct SinusoidFit {
 
 impl<'a> SinusoidFitter<'a> {
     fn new(problem: &'a DiagnosisProblem, rest: &'a [Vec<f64>], channel: usize) -> Self {
-        let mut pool =
-            ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
+        let mut pool = ColumnPool::new(&problem.layout).exclude_samples(&problem.undecided_samples());
         let columns = problem.base.iter().chain(&problem.friction);
         let known = columns.map(|c| pool.add(c)).collect();
         let target = pool.add(ForceColumn(rest.iter().cloned().map(Some).collect()));
@@ -202,18 +187,18 @@ impl<'a> SinusoidFitter<'a> {
         let layout = &self.problem.layout;
         let mut which = self.base_columns.clone();
         let mut start = 0;
-        for stretch in &layout.segments {
+        for segment in &layout.segments {
             // A sine and a cosine in every segment.
             for shift in [0.0, 0.25] {
                 let mut wave = vec![0.0; layout.samples()];
-                for (i, x) in wave[start..start + stretch.samples].iter_mut().enumerate() {
-                    *x = (TAU * (frequency * stretch.step * i as f64 + shift)).sin();
+                for (i, x) in wave[start..start + segment.samples].iter_mut().enumerate() {
+                    *x = (TAU * (frequency * segment.step * i as f64 + shift)).sin();
                 }
                 let mut column = ForceColumn(vec![None; self.weights.len()]);
                 column.0[self.channel] = Some(wave);
                 which.push(self.pool.add(column));
             }
-            start += stretch.samples;
+            start += segment.samples;
         }
         which.push(self.target);
         let (factors, _) = solve_gram(&self.pool.gram(&which, &self.weights, FitScope::All));
@@ -225,10 +210,7 @@ impl<'a> SinusoidFitter<'a> {
         // Force of the sinusoid: its columns times their factors.
         let mut taken = vec![0.0; layout.samples()];
         let waves = self.pool.split_off(self.target + 1);
-        for (wave, factor) in waves
-            .iter()
-            .zip(factors.iter().skip(self.base_columns.len()))
-        {
+        for (wave, factor) in waves.iter().zip(factors.iter().skip(self.base_columns.len())) {
             for (sum, x) in taken.iter_mut().zip(wave.0[self.channel].iter().flatten()) {
                 *sum += factor * x;
             }
@@ -245,18 +227,17 @@ impl<'a> SinusoidFitter<'a> {
     fn least_explained_share(&self, wave: &SinusoidFit, parts: usize) -> f64 {
         let mut start = 0;
         let mut least: Option<f64> = None;
-        for stretch in &self.problem.layout.segments {
+        for segment in &self.problem.layout.segments {
             for part in 0..parts {
-                let [from, to] = [part, part + 1].map(|k| start + k * stretch.samples / parts);
-                let [before, after] =
-                    [self.residual, &wave.residual].map(|r| dot(&r[from..to], &r[from..to]));
+                let [from, to] = [part, part + 1].map(|k| start + k * segment.samples / parts);
+                let [before, after] = [self.residual, &wave.residual].map(|r| dot(&r[from..to], &r[from..to]));
                 // Share of the squares that the sinusoid explains in this part.
                 if before > 0.0 {
                     let taken = 1.0 - after / before;
                     least = Some(least.map_or(taken, |least| least.min(taken)));
                 }
             }
-            start += stretch.samples;
+            start += segment.samples;
         }
         least.unwrap_or(0.0)
     }
@@ -267,10 +248,7 @@ impl<'a> SinusoidFitter<'a> {
         let lasts = self.problem.layout.segments.iter();
         let lasts: Vec<f64> = lasts.map(|s| s.samples as f64 * s.step).collect();
         // Fewer periods than this could be a motion or a drift.
-        if lasts
-            .iter()
-            .any(|lasts| lasts * about < SLOW_LINE_LEAST_PERIODS)
-        {
+        if lasts.iter().any(|lasts| lasts * about < SLOW_LINE_LEAST_PERIODS) {
             return None;
         }
         // The starting frequency must already explain a part of every segment.
@@ -341,12 +319,12 @@ fn remove_and_report(
 fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> {
     let mut start = 0;
     let mut longest: Option<(f64, &[f64], f64)> = None;
-    for stretch in &problem.layout.segments {
-        let part = &rest[start..start + stretch.samples];
-        start += stretch.samples;
-        let lasts = stretch.samples as f64 * stretch.step;
+    for segment in &problem.layout.segments {
+        let part = &rest[start..start + segment.samples];
+        start += segment.samples;
+        let lasts = segment.samples as f64 * segment.step;
         if longest.is_none_or(|(most, ..)| lasts > most) {
-            longest = Some((lasts, part, stretch.step));
+            longest = Some((lasts, part, segment.step));
         }
     }
     let (_, part, step) = longest?;
@@ -358,21 +336,17 @@ fn strongest_frequency(problem: &DiagnosisProblem, rest: &[f64]) -> Option<f64> 
 
 /// The most prominent line of a series above a frequency `lowest`, Hz: its ratio to the spectrum around it, and its
 /// frequency, Hz. `None` if none is above the least ratio.
-fn most_prominent_line(
-    problem: &DiagnosisProblem,
-    rest: &[f64],
-    lowest: f64,
-) -> Option<(f64, f64)> {
+fn most_prominent_line(problem: &DiagnosisProblem, rest: &[f64], lowest: f64) -> Option<(f64, f64)> {
     let mut best: Option<(f64, f64)> = None;
     let mut start = 0;
-    for stretch in &problem.layout.segments {
-        let power = hann_power(&rest[start..start + stretch.samples]);
-        start += stretch.samples;
+    for segment in &problem.layout.segments {
+        let power = hann_power(&rest[start..start + segment.samples]);
+        start += segment.samples;
         // A short segment has too few frequencies for a neighbourhood.
         if power.len() < 4 * NEIGHBOURHOOD {
             continue;
         }
-        let per_step = 0.5 / stretch.step / (power.len() - 1) as f64;
+        let per_step = 0.5 / segment.step / (power.len() - 1) as f64;
         for k in LINE..power.len() {
             let frequency = k as f64 * per_step;
             // A line is the highest of its neighbours.
@@ -395,12 +369,7 @@ fn most_prominent_line(
 }
 
 /// The frequency, Hz, near `about` at which a sine and a cosine explain most of all channels.
-fn refine_frequency(
-    problem: &DiagnosisProblem,
-    rest: &[Vec<f64>],
-    unfit: &[Vec<bool>],
-    about: f64,
-) -> f64 {
+fn refine_frequency(problem: &DiagnosisProblem, rest: &[Vec<f64>], unfit: &[Vec<bool>], about: f64) -> f64 {
     let longest = problem.layout.segments.iter();
     let longest = longest.map(|s| s.samples as f64 * s.step);
     // Frequency resolution of the longest segment.
@@ -427,20 +396,14 @@ fn refine_frequency(
 
 /// Subtracts the best sine and cosine from a series, segment by segment. They are fitted without the samples in
 /// `unfit`, and subtracted from all samples that are not `spared`.
-fn subtract_sinusoid(
-    problem: &DiagnosisProblem,
-    rest: &mut [f64],
-    unfit: &[bool],
-    spared: &[bool],
-    frequency: f64,
-) {
+fn subtract_sinusoid(problem: &DiagnosisProblem, rest: &mut [f64], unfit: &[bool], spared: &[bool], frequency: f64) {
     let mut start = 0;
-    for stretch in &problem.layout.segments {
-        let part = &mut rest[start..start + stretch.samples];
+    for segment in &problem.layout.segments {
+        let part = &mut rest[start..start + segment.samples];
         let is_out = |out: &[bool], i: usize| out.get(start + i) == Some(&true);
         // Sine and cosine at the samples of the segment.
         let waves: Vec<(f64, f64)> = (0..part.len())
-            .map(|i| (TAU * frequency * stretch.step * i as f64).sin_cos())
+            .map(|i| (TAU * frequency * segment.step * i as f64).sin_cos())
             .collect();
         let mut sums = [0.0; 5];
         for i in (0..part.len()).filter(|i| !is_out(unfit, *i)) {
@@ -460,7 +423,7 @@ fn subtract_sinusoid(
                 part[i] -= a * s + b * c;
             }
         }
-        start += stretch.samples;
+        start += segment.samples;
     }
 }
 
@@ -472,7 +435,7 @@ mod tests {
 
     /// Two segments of 300 samples at 44 Hz, with the residual of a force.
     fn problem(rest: &[f64]) -> DiagnosisProblem {
-        let stretch = |name: &str, is_check: bool| SampleSegment {
+        let segment = |name: &str, is_check: bool| SampleSegment {
             name: name.into(),
             samples: rest.len() / 2,
             step: 1.0 / 44.0,
@@ -482,7 +445,7 @@ mod tests {
         DiagnosisProblem {
             layout: SampleLayout {
                 channels: vec!["a".into()],
-                segments: vec![stretch("fit", false), stretch("check", true)],
+                segments: vec![segment("fit", false), segment("check", true)],
                 left_out: Vec::new(),
             },
             measured: ForceColumn(vec![Some(rest.to_vec())]),
@@ -493,9 +456,7 @@ mod tests {
 
     fn taken_off(problem: &mut DiagnosisProblem, rest: &[Vec<f64>]) -> Vec<Disturbance> {
         let lines = slow_lines(problem, rest, &vec![0.0; rest.len()], &[]);
-        let off = lines
-            .iter()
-            .filter_map(|line| line.remove_from_force(problem));
+        let off = lines.iter().filter_map(|line| line.remove_from_force(problem));
         off.collect()
     }
 
@@ -566,8 +527,7 @@ mod tests {
                 let mut last = [0.0; 2];
                 let swings: Vec<f64> = (0..1200)
                     .map(|_| {
-                        let now = 2.0 * keeps * omega.cos() * last[0] - keeps * keeps * last[1]
-                            + noise.normal();
+                        let now = 2.0 * keeps * omega.cos() * last[0] - keeps * keeps * last[1] + noise.normal();
                         last = [now, last[0]];
                         now
                     })
@@ -585,9 +545,7 @@ mod tests {
     fn a_hum_is_told_by_its_size_beside_the_model_and_lost_samples() {
         let mut noise = TestNoise::new(4);
         let n = 600;
-        let base: Vec<f64> = (0..n)
-            .map(|i| (TAU * 0.7 / 44.0 * f64::from(i)).sin())
-            .collect();
+        let base: Vec<f64> = (0..n).map(|i| (TAU * 0.7 / 44.0 * f64::from(i)).sin()).collect();
         let hum = |i: i32| 1.0 * (TAU * 0.78 / 44.0 * f64::from(i) + 0.3).sin();
         let measured: Vec<f64> = (0..n)
             .map(|i| 4.0 * base[usize::try_from(i).unwrap()] + hum(i) + 0.1 * noise.normal())

@@ -4,18 +4,18 @@
 //!
 //! 1. [`DiagnosisProblem`] - measured forces, columns of the model, candidates with the constants that are searched
 //!    for.
-//! 2. `pool`, `factored`, `beside`, `bench` - inner products of all columns, so that a set of effects is fitted in
-//!    microseconds; `tuning` finds constants, `following` computes columns that depend on the fit, `readings` those of
+//! 2. `pool`, `factored`, `conditional`, `bench` - inner products of all columns, so that a set of effects is fitted in
+//!    microseconds; `tuning` finds constants, `fit_dependent` computes columns that depend on the fit, `force_signals` those of
 //!    faulty force signals, `tilt` rotates gravity, `body` places an additional mass, `constant` corrects a number of
 //!    the model.
-//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `settle`
+//! 3. `search` - forward search over sets, with exchanges; `evidence` decides on time that was not fitted; `simplification`
 //!    makes the last set as small and simple as possible.
 //! 4. `aliases` - effects that this recording cannot distinguish; `reproducible` - the repeatable residual that no
 //!    candidate explains.
 //! 5. [`ModelDiagnosis`] - the answer.
 //!
 //! Disturbances of the recordings are reported by name too: `cleaning` removes outliers and `hum` beforehand, `drifts`
-//! and `readings` are candidates among the others, and `disturbance` splits the residual by its origin.
+//! and `force_signals` are candidates among the others, and `disturbance` splits the residual by its origin.
 //!
 //! Decision: disturbances of recordings compete with effects. An encoder error, a drift or a wrong scale resembles some
 //! effect at any size, so they are candidates like all others, and only effects decide the verdict. Disturbances that
@@ -27,34 +27,34 @@
 
 mod aliases;
 mod bench;
-mod beside;
 mod body;
 mod bounds;
 mod cleaning;
 mod column;
+mod conditional;
 mod constant;
 mod disturbance;
 mod drifts;
 mod estimates;
 mod evidence;
 mod factored;
-mod following;
+mod fit_dependent;
+mod force_signals;
 mod hum;
-mod idle;
 mod laws;
 mod noise;
 mod numbered;
 mod pool;
 mod problem;
-mod readings;
 mod reproducible;
 mod search;
-mod settle;
+mod simplification;
 mod thresholds;
 mod tile;
 mod tilt;
 mod tuning;
-mod untold;
+mod undetermined;
+mod zero_columns;
 
 use serde::Serialize;
 
@@ -65,16 +65,14 @@ pub use constant::ConstantCorrection;
 pub use disturbance::{Disturbance, EstimatedQuantity, ResidualBudget};
 pub use drifts::drift_candidates;
 pub use evidence::SelectionEvidence;
-pub use laws::{
-    LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw,
-};
+pub use force_signals::reading_fault_candidates;
+pub use laws::{LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, SiteLaw};
 pub use noise::{effective_samples, white_noise};
 pub use problem::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem,
-    EffectParameter, ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider,
-    ReadingFaultKind, SampleLayout, SampleSegment, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, EffectParameter,
+    ForceReadingFault, LoadDependentQuery, LocatedEffect, NoColumnProvider, ReadingFaultKind, SampleLayout,
+    SampleSegment, SignConstraint,
 };
-pub use readings::reading_fault_candidates;
 pub use thresholds::FORCE_ROUNDING;
 pub use tilt::{ForceSensitivity, TiltCandidate};
 
@@ -252,9 +250,8 @@ fn diagnose_cleaned(
         let left_then = bench.set_residual(&needed);
         let (sites_then, laws_then) = bench.find_laws(&needed, &left_then);
         let stands = |law: &LawProposal| {
-            let is_its = |then: &LawProposal| {
-                then.channels == law.channels && then.law.gain >= REPLACING_LAW_LEAST_SHARE
-            };
+            let is_its =
+                |then: &LawProposal| then.channels == law.channels && then.law.gain >= REPLACING_LAW_LEAST_SHARE;
             law.law.gain < REPLACING_LAW_LEAST_SHARE || laws_then.iter().any(is_its)
         };
         if laws.iter().all(stands) {
@@ -331,14 +328,10 @@ fn diagnose_cleaned(
 }
 
 /// Joins friction that is missing and also drifts into one effect: friction that changes with time.
-fn merge_drifting_friction(
-    effects: &mut Vec<IdentifiedEffect>,
-    disturbances: &mut Vec<Disturbance>,
-) {
+fn merge_drifting_friction(effects: &mut Vec<IdentifiedEffect>, disturbances: &mut Vec<Disturbance>) {
     disturbances.retain(|drift| {
-        let is_its = |found: &IdentifiedEffect| {
-            found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str())
-        };
+        let is_its =
+            |found: &IdentifiedEffect| found.effect.at == drift.at && FRICTION.contains(&found.effect.kind.as_str());
         let Some(at) = effects.iter().position(is_its) else {
             return true;
         };
@@ -356,8 +349,7 @@ fn merge_drifting_friction(
 
 /// Root of the summed squares of the channels' noise, relative to that of their forces; 0 without force.
 fn noise_floor(budgets: &[ResidualBudget]) -> f64 {
-    let sum =
-        |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
+    let sum = |of: &dyn Fn(&ResidualBudget) -> f64| budgets.iter().map(|b| of(b).powi(2)).sum::<f64>();
     let force = sum(&|budget| budget.force);
     if force > 0.0 {
         (sum(&|budget| budget.noise) / force).sqrt()
@@ -397,11 +389,7 @@ impl EffectSelector<'_> {
 
     /// Proposes laws for the residual of a set, with the places where they may act; empty if only effects are
     /// requested.
-    fn find_laws(
-        &self,
-        picks: &[SelectedEffect],
-        left: &SetResidual,
-    ) -> (Vec<LawSite>, Vec<LawProposal>) {
+    fn find_laws(&self, picks: &[SelectedEffect], left: &SetResidual) -> (Vec<LawSite>, Vec<LawProposal>) {
         if self.problem.effects_only {
             return (Vec::new(), Vec::new());
         }
@@ -415,11 +403,7 @@ impl EffectSelector<'_> {
 
     /// Members of a set that proposed laws do not make unnecessary. An effect that a law replaces is part of it, if the
     /// law explains most of the residual and acts on all channels of the effect.
-    fn effects_outside_laws(
-        &self,
-        picks: &[SelectedEffect],
-        laws: &[LawProposal],
-    ) -> Vec<SelectedEffect> {
+    fn effects_outside_laws(&self, picks: &[SelectedEffect], laws: &[LawProposal]) -> Vec<SelectedEffect> {
         let is_part = |pick: &SelectedEffect, proposal: &LawProposal| {
             let channels = self.affected_channels(std::slice::from_ref(pick));
             let effect = &self.candidate(pick).effect;
@@ -427,25 +411,20 @@ impl EffectSelector<'_> {
                 && proposal.law.replaced_effects.contains(effect)
                 && channels.iter().all(|d| proposal.channels.contains(d))
         };
-        let is_needed =
-            |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
+        let is_needed = |pick: &&SelectedEffect| !laws.iter().any(|proposal| is_part(pick, proposal));
         picks.iter().filter(is_needed).cloned().collect()
     }
 
     /// Drops members that explain less than what stays unexplained on their channels, the weakest first, and returns
     /// the set with its residual. There an unknown law is as likely as the effect.
-    fn drop_below_unexplained(
-        &mut self,
-        mut picks: Vec<SelectedEffect>,
-    ) -> (Vec<SelectedEffect>, SetResidual) {
+    fn drop_below_unexplained(&mut self, mut picks: Vec<SelectedEffect>) -> (Vec<SelectedEffect>, SetResidual) {
         loop {
             let left = self.set_residual(&picks);
             // Find the member whose gain is smallest relative to the unexplained repeatable squares on its channels.
             let mut least: Option<(f64, Vec<SelectedEffect>)> = None;
             for i in 0..picks.len() {
                 let channels = self.affected_channels(&picks[i..=i]);
-                let squares =
-                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let unexplained = channels.iter().filter(|d| left.unexplained.contains(d));
                 let stays: f64 = unexplained
                     .map(|d| left.repeatable_share[*d] * squares(&left.residual, *d))
@@ -459,15 +438,12 @@ impl EffectSelector<'_> {
                 let fewer = self.refresh_columns(fewer);
                 let (factors, _) = self.fit(&fewer, FitScope::All);
                 let rest = self.residual(&fewer, &factors);
-                let squares =
-                    |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
+                let squares = |rest: &[Vec<f64>], d: usize| self.weights[d] * dot(&rest[d], &rest[d]);
                 let gains = channels
                     .iter()
                     .map(|d| squares(&rest, *d) - squares(&left.residual, *d));
                 let share = gains.sum::<f64>() / stays;
-                if share < EFFECT_LEAST_UNEXPLAINED_RATIO
-                    && least.as_ref().is_none_or(|(other, _)| share < *other)
-                {
+                if share < EFFECT_LEAST_UNEXPLAINED_RATIO && least.as_ref().is_none_or(|(other, _)| share < *other) {
                     least = Some((share, fewer));
                 }
             }
@@ -491,9 +467,7 @@ impl EffectSelector<'_> {
         let table = self.projected_gram(&[]);
         let total = self.fit_from_gram(&table, Vec::new()).squares;
         let share = |pick: &Option<SelectedEffect>| match pick {
-            Some(pick) if total > 0.0 => {
-                1.0 - self.fit_from_gram(&table, vec![pick.clone()]).squares / total
-            }
+            Some(pick) if total > 0.0 => 1.0 - self.fit_from_gram(&table, vec![pick.clone()]).squares / total,
             _ => 0.0,
         };
         self.current_choices.iter().map(share).collect()
@@ -507,11 +481,9 @@ impl EffectSelector<'_> {
         evidence: Option<SelectionEvidence>,
     ) -> SelectionStep {
         let effects = |set: &[SelectedEffect], other: &[SelectedEffect]| -> Vec<LocatedEffect> {
-            let is_new =
-                |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
+            let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
             let new = set.iter().filter(is_new);
-            new.map(|pick| self.candidate(pick).effect.clone())
-                .collect()
+            new.map(|pick| self.candidate(pick).effect.clone()).collect()
         };
         let (fit, check, check_by_channel) = self.relative_errors(after);
         SelectionStep {
@@ -531,17 +503,13 @@ impl EffectSelector<'_> {
         let split = layout.fit_samples();
         let rest = self.full_residual(picks);
         let channels = 0..rest.len();
-        let forces: Vec<Vec<f64>> = channels
-            .clone()
-            .map(|d| self.problem.measured_force(d))
-            .collect();
+        let forces: Vec<Vec<f64>> = channels.clone().map(|d| self.problem.measured_force(d)).collect();
         let norm = |part: &[f64]| dot(part, part);
         let squares = |of: &[Vec<f64>], range: std::ops::Range<usize>| -> Vec<f64> {
             of.iter().map(|all| norm(&all[range.clone()])).collect()
         };
         let relative = |error: f64, force: f64| (error / force.max(f64::MIN_POSITIVE)).sqrt();
-        let whole =
-            |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
+        let whole = |errors: &[f64], forces: &[f64]| relative(errors.iter().sum(), forces.iter().sum());
         let fit = whole(&squares(&rest, 0..split), &squares(&forces, 0..split));
         let judged = if layout.has_check() {
             split..layout.samples()
@@ -552,12 +520,7 @@ impl EffectSelector<'_> {
             squares(&rest, judged.clone())
         } else {
             // Validation errors are weighted by channel; reported errors are not.
-            let held_out = |d: usize| {
-                self.validation_errors(picks, &[d], true)
-                    .iter()
-                    .sum::<f64>()
-                    / self.weights[d]
-            };
+            let held_out = |d: usize| self.validation_errors(picks, &[d], true).iter().sum::<f64>() / self.weights[d];
             channels.map(held_out).collect()
         };
         let forces = squares(&forces, judged);
@@ -583,12 +546,7 @@ impl EffectSelector<'_> {
     /// Whether a change raises the squared residual over all samples, reversals included, in the fit and in the
     /// validation runs. Then it explains the samples that decide at the cost of those next to reversals, where an
     /// effect would act too.
-    fn is_worse_overall(
-        &self,
-        before: &[SelectedEffect],
-        after: &[SelectedEffect],
-        channels: &[usize],
-    ) -> bool {
+    fn is_worse_overall(&self, before: &[SelectedEffect], after: &[SelectedEffect], channels: &[usize]) -> bool {
         if self.problem.jumps.is_empty() {
             return false;
         }
@@ -645,11 +603,7 @@ impl EffectSelector<'_> {
                 let mut with = picks.to_vec();
                 with.push(pick.clone());
                 let trial = self.fit_from_gram(&table, with);
-                let gain = if now > 0.0 {
-                    1.0 - trial.squares / now
-                } else {
-                    0.0
-                };
+                let gain = if now > 0.0 { 1.0 - trial.squares / now } else { 0.0 };
                 let why = if trial.wrong_sign.contains(&picks.len()) {
                     WRONG_SIGN
                 } else if trial.cancelling.contains(&picks.len()) {
@@ -672,10 +626,7 @@ impl EffectSelector<'_> {
         }
         // Found effects first, then by the share that each explains alone.
         considered.sort_by(|a, b| {
-            (b.rejection_reason
-                .is_none()
-                .cmp(&a.rejection_reason.is_none()))
-            .then(b.explained.total_cmp(&a.explained))
+            (b.rejection_reason.is_none().cmp(&a.rejection_reason.is_none())).then(b.explained.total_cmp(&a.explained))
         });
         considered
     }

@@ -12,8 +12,7 @@ pub fn effective_samples(values: &[f64]) -> f64 {
     if n < 4 || variance == 0.0 {
         return n as f64;
     }
-    let correlation =
-        |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
+    let correlation = |lag: usize| super::pool::dot(&centred[..n - lag], &centred[lag..]) / variance;
     // The sum starts at 1; pairs of lags follow up to a quarter of the series.
     let mut sum = 1.0;
     let mut lag = 1;

@@ -71,11 +71,7 @@ impl<'a> ColumnPool<'a> {
             of_folds: RefCell::default(),
             folds: layout.blocks(FOLDS),
             lost: layout.left_out.clone(),
-            left_out: layout
-                .left_out
-                .iter()
-                .map(|out| true_indices(out))
-                .collect(),
+            left_out: layout.left_out.iter().map(|out| true_indices(out)).collect(),
             prior_equations: None,
         }
     }
@@ -85,9 +81,10 @@ impl<'a> ColumnPool<'a> {
         // Unite the new exclusions with the samples that were not measured.
         let all = left_out.iter().enumerate().map(|(d, out)| {
             let lost = self.lost.get(d);
-            let either = out.iter().enumerate().map(|(i, out)| {
-                *out || lost.is_some_and(|lost| lost.get(i).copied().unwrap_or(false))
-            });
+            let either = out
+                .iter()
+                .enumerate()
+                .map(|(i, out)| *out || lost.is_some_and(|lost| lost.get(i).copied().unwrap_or(false)));
             true_indices(&either.collect::<Vec<bool>>())
         });
         if !left_out.is_empty() {
@@ -97,13 +94,7 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// Inner product of two columns' values on a channel over a range of samples, without excluded ones.
-    pub(crate) fn inner_product(
-        &self,
-        channel: usize,
-        a: &[f64],
-        b: &[f64],
-        range: Range<usize>,
-    ) -> f64 {
+    pub(crate) fn inner_product(&self, channel: usize, a: &[f64], b: &[f64], range: Range<usize>) -> f64 {
         let less = self.excluded_product(channel, a, b, &range);
         dot(&a[range.clone()], &b[range]) - less
     }
@@ -221,10 +212,7 @@ impl<'a> ColumnPool<'a> {
                         let is_twice = rows == columns && c > r;
                         // A product is stored with the column of the larger index.
                         let (later, earlier) = (*a.max(b), a.min(b));
-                        if !is_twice
-                            && self.has_common_channel(*a, *b)
-                            && !products[later].contains_key(earlier)
-                        {
+                        if !is_twice && self.has_common_channel(*a, *b) && !products[later].contains_key(earlier) {
                             unknown.push((r, c));
                         }
                     }
@@ -244,12 +232,7 @@ impl<'a> ColumnPool<'a> {
 
     /// The same as [`Self::products_of`] for some pairs of a tile, in their order; a pair is (row, column) within the
     /// tile.
-    fn compute_tile(
-        &self,
-        rows: &[usize],
-        columns: &[usize],
-        pairs: &[(usize, usize)],
-    ) -> Vec<Box<[f64]>> {
+    fn compute_tile(&self, rows: &[usize], columns: &[usize], pairs: &[(usize, usize)]) -> Vec<Box<[f64]>> {
         let mut found: Vec<Vec<f64>> = vec![Vec::new(); pairs.len()];
         for part in [&self.fit, &self.check] {
             for d in 0..self.channels {
@@ -259,10 +242,7 @@ impl<'a> ColumnPool<'a> {
                 let Some(any) = r.iter().flatten().next() else {
                     continue;
                 };
-                if !pairs
-                    .iter()
-                    .any(|(i, j)| r[*i].is_some() && c[*j].is_some())
-                {
+                if !pairs.iter().any(|(i, j)| r[*i].is_some() && c[*j].is_some()) {
                     continue;
                 }
                 // Columns that do not act on this channel are replaced by any other one; their products are not used.
@@ -285,12 +265,7 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// The same for columns that are not in the pool; nothing is stored.
-    pub(crate) fn weighted_product_of(
-        &self,
-        a: &ForceColumn,
-        b: &ForceColumn,
-        weights: &[f64],
-    ) -> f64 {
+    pub(crate) fn weighted_product_of(&self, a: &ForceColumn, b: &ForceColumn, weights: &[f64]) -> f64 {
         let on = |(d, a, b)| weights[d] * self.inner_product(d, a, b, self.all_samples());
         a.common_channels(b).map(on).sum()
     }
@@ -303,21 +278,14 @@ impl<'a> ColumnPool<'a> {
         // Products are stored with the column of the larger index.
         let (a, b) = (a.max(b), a.min(b));
         let mut products = self.products.borrow_mut();
-        let known = products[a]
-            .entry(b)
-            .or_insert_with(|| self.products_of(a, b));
+        let known = products[a].entry(b).or_insert_with(|| self.products_of(a, b));
         // First half: products on the fit; second half: on the validation runs.
         let (fit, check) = known.split_at(known.len() / 2);
         // The bits give the common channels without reading the columns.
         let common = (0..self.channels).filter(|d| self.acts_on(a, *d) && self.acts_on(b, *d));
-        let sums = common.zip(fit.iter().zip(check)).map(|(d, (fit, check))| {
-            weights[d]
-                * if on == FitScope::All {
-                    fit + check
-                } else {
-                    *fit
-                }
-        });
+        let sums = common
+            .zip(fit.iter().zip(check))
+            .map(|(d, (fit, check))| weights[d] * if on == FitScope::All { fit + check } else { *fit });
         sums.sum()
     }
 
@@ -328,8 +296,7 @@ impl<'a> ColumnPool<'a> {
         for i in 0..n {
             for j in 0..=i {
                 // The matrix is symmetric, so one half is computed.
-                let sum = self.scoped_product(which[i], which[j], weights, on)
-                    + self.prior_term(which[i], which[j]);
+                let sum = self.scoped_product(which[i], which[j], weights, on) + self.prior_term(which[i], which[j]);
                 gram[(i, j)] = sum;
                 gram[(j, i)] = sum;
             }
@@ -339,19 +306,12 @@ impl<'a> ColumnPool<'a> {
 
     /// Entry of the prior equations for two factors; zero without prior.
     fn prior_term(&self, a: usize, b: usize) -> f64 {
-        let entry = self
-            .prior_equations
-            .as_ref()
-            .and_then(|prior| prior.get((a, b)));
+        let entry = self.prior_equations.as_ref().and_then(|prior| prior.get((a, b)));
         entry.copied().unwrap_or(0.0)
     }
 
     /// Matrices of weighted inner products of some columns, one for each fold with its range of samples.
-    pub(crate) fn fold_grams(
-        &self,
-        which: &[usize],
-        weights: &[f64],
-    ) -> Vec<(Range<usize>, DMatrix<f64>)> {
+    pub(crate) fn fold_grams(&self, which: &[usize], weights: &[f64]) -> Vec<(Range<usize>, DMatrix<f64>)> {
         let n = which.len();
         let mut grams = vec![DMatrix::zeros(n, n); self.folds.len()];
         let mut products = self.of_folds.borrow_mut();
@@ -401,12 +361,7 @@ impl<'a> ColumnPool<'a> {
     }
 
     /// The same with excluded samples kept; only those that were not measured are zero.
-    pub(crate) fn full_residual(
-        &self,
-        of: usize,
-        others: &[usize],
-        factors: &[f64],
-    ) -> Vec<Vec<f64>> {
+    pub(crate) fn full_residual(&self, of: usize, others: &[usize], factors: &[f64]) -> Vec<Vec<f64>> {
         // Start with the column and subtract the others one after the other.
         let samples = self.check.end;
         let mut rest: Vec<Vec<f64>> = (self.columns[of].0.iter())
@@ -504,10 +459,7 @@ pub(crate) fn solve_gram(gram: &DMatrix<f64>) -> (DVector<f64>, f64) {
                 continue;
             }
             // The part that earlier columns of the factor explain.
-            let known = dot(
-                &upper.column(i).as_slice()[..j],
-                &upper.column(j).as_slice()[..j],
-            );
+            let known = dot(&upper.column(i).as_slice()[..j], &upper.column(j).as_slice()[..j]);
             let sum = gram[(j, i)] / (scale[i] * scale[j]) - known;
             // Off-diagonal entry, squared residual of the last column, or a new diagonal entry; dependent columns are
             // cleared.
@@ -576,8 +528,7 @@ mod tests {
         measured.add(-3.0, pool.column(two));
         let y = pool.add(measured.clone());
         let weights = [1.0, 4.0];
-        let (factors, squares) =
-            solve_gram(&pool.gram(&[one, two, copy, y], &weights, FitScope::All));
+        let (factors, squares) = solve_gram(&pool.gram(&[one, two, copy, y], &weights, FitScope::All));
         let column = |k: usize| -> Vec<f64> {
             let part = |d: usize| pool.column(k).0[d].clone().unwrap_or_else(|| vec![0.0; 50]);
             let weighed = part(1).into_iter().map(|x| 2.0 * x);
@@ -586,9 +537,7 @@ mod tests {
         let matrix = DMatrix::from_columns(&[column(one).into(), column(two).into()]);
         let right = DVector::from(column(y));
         let expected = matrix.clone().svd(true, true).solve(&right, 0.0).unwrap();
-        assert!(
-            (factors[0] - expected[0]).abs() < 1e-10 && (factors[1] - expected[1]).abs() < 1e-10
-        );
+        assert!((factors[0] - expected[0]).abs() < 1e-10 && (factors[1] - expected[1]).abs() < 1e-10);
         assert!(factors[2].abs() < f64::MIN_POSITIVE);
         let rest = (matrix * expected - right).norm_squared();
         assert!((squares - rest).abs() < 1e-9 * rest);

@@ -60,17 +60,17 @@ impl SampleLayout {
     pub fn blocks(&self, per_stretch: usize) -> Vec<std::ops::Range<usize>> {
         let mut blocks = Vec::new();
         let mut start = 0;
-        for stretch in &self.segments {
+        for segment in &self.segments {
             // A short segment gets a few short blocks, since one block alone has no spread.
             let count = per_stretch
-                .min((stretch.samples / 20).max(FEWEST_BLOCKS))
-                .min(stretch.samples)
+                .min((segment.samples / 20).max(FEWEST_BLOCKS))
+                .min(segment.samples)
                 .max(1);
             for k in 0..count {
-                let at = |k: usize| start + k * stretch.samples / count;
+                let at = |k: usize| start + k * segment.samples / count;
                 blocks.push(at(k)..at(k + 1));
             }
-            start += stretch.samples;
+            start += segment.samples;
         }
         blocks
     }
@@ -178,11 +178,7 @@ pub trait ColumnProvider {
 
     /// Columns of load-dependent candidates, as (index of the candidate, columns). `load` is the force that each drive
     /// carries, N or N m.
-    fn load_dependent_columns(
-        &self,
-        load: &ForceColumn,
-        which: LoadDependentQuery,
-    ) -> Vec<(usize, ColumnChoice)>;
+    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)>;
 
     /// Places on which proposed laws may act; requested only if a residual stays unexplained.
     fn sites(&self) -> Vec<LawSite> {
@@ -198,11 +194,7 @@ impl ColumnProvider for NoColumnProvider {
         None
     }
 
-    fn load_dependent_columns(
-        &self,
-        _: &ForceColumn,
-        _: LoadDependentQuery,
-    ) -> Vec<(usize, ColumnChoice)> {
+    fn load_dependent_columns(&self, _: &ForceColumn, _: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
         Vec::new()
     }
 }
@@ -293,7 +285,7 @@ mod tests {
     /// A single block has no spread, so short segments have several.
     #[test]
     fn a_short_stretch_has_several_blocks() {
-        let stretch = |samples| SampleSegment {
+        let segment = |samples| SampleSegment {
             name: String::new(),
             samples,
             step: 0.01,
@@ -303,7 +295,7 @@ mod tests {
         for (samples, blocks) in [(30, 6), (90, 6), (200, 10), (5000, 12), (3, 3)] {
             let layout = SampleLayout {
                 channels: Vec::new(),
-                segments: vec![stretch(samples)],
+                segments: vec![segment(samples)],
                 left_out: Vec::new(),
             };
             let cut = layout.blocks(12);

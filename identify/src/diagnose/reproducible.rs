@@ -42,11 +42,7 @@ pub(crate) fn repeatable_shares(
     let n = layout.samples();
     // Many features need many operations, so fewer samples are used then.
     let count = feature_count(variables.len());
-    let most = if count > MOST_FEATURES {
-        MOST_OF_MANY
-    } else {
-        MOST
-    };
+    let most = if count > MOST_FEATURES { MOST_OF_MANY } else { MOST };
     let picked: Vec<usize> = (0..n).step_by(n.div_ceil(most).max(1)).collect();
     let features = state_features(variables, &picked);
     if features.is_empty() {
@@ -86,11 +82,7 @@ type FoldErrors = Vec<Vec<f64>>;
 
 /// Validation errors from normal equations of the features. Their matrices are computed per fold; the sum minus one
 /// fold belongs to the other folds.
-fn errors_by_features(
-    features: &DMatrix<f64>,
-    targets: &DMatrix<f64>,
-    folds: &[Range<usize>],
-) -> FoldErrors {
+fn errors_by_features(features: &DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> FoldErrors {
     let m = features.ncols();
     let rows = |of: &DMatrix<f64>, fold: &Range<usize>| of.rows_range(fold.clone()).into_owned();
     // Products of the features with themselves and with the targets, fold by fold.
@@ -117,11 +109,7 @@ fn errors_by_features(
                 others[(i, i)] += 1e-12;
             }
             let factors = others.cholesky()?.solve(&(&whole[1] - right));
-            add_errors(
-                &mut left,
-                rows(features, fold) * factors,
-                &rows(targets, fold),
-            );
+            add_errors(&mut left, rows(features, fold) * factors, &rows(targets, fold));
         }
         Some(left)
     };
@@ -130,11 +118,7 @@ fn errors_by_features(
 
 /// The same if there are more features than samples: kernel ridge regression from inner products of the samples (C.
 /// Saunders, A. Gammerman and V. Vovk, ICML 1998).
-fn errors_by_samples(
-    mut features: DMatrix<f64>,
-    targets: &DMatrix<f64>,
-    folds: &[Range<usize>],
-) -> FoldErrors {
+fn errors_by_samples(mut features: DMatrix<f64>, targets: &DMatrix<f64>, folds: &[Range<usize>]) -> FoldErrors {
     for mut column in features.column_iter_mut() {
         let norm = column.norm();
         if norm > 0.0 {
@@ -190,12 +174,7 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
         }
         // A sign that is smooth at zero, so that noise of the rate does no harm.
         if name.ends_with("_d") {
-            let sign = |share: f64| {
-                values
-                    .iter()
-                    .map(|x| (x / (share * spread)).tanh())
-                    .collect()
-            };
+            let sign = |share: f64| values.iter().map(|x| (x / (share * spread)).tanh()).collect();
             // Two widths: nearly a jump, and a smooth transition.
             signs.push(sign(0.02));
             signs.push(sign(0.2));
@@ -204,19 +183,14 @@ fn state_features(variables: &[(String, Vec<f64>)], picked: &[usize]) -> Vec<Vec
         // earlier reversals.
         if !name.ends_with("_d") && !name.ends_with("_dd") {
             shapes.extend(hinges(&values, spread));
-            let memories = MEMORIES
-                .iter()
-                .map(|share| dahl_state(&values, share * spread));
+            let memories = MEMORIES.iter().map(|share| dahl_state(&values, share * spread));
             shapes.extend(memories);
-            let stops = STOPS
-                .iter()
-                .map(|share| stop_operator(&values, share * spread));
+            let stops = STOPS.iter().map(|share| stop_operator(&values, share * spread));
             shapes.extend(stops);
         }
         scaled.push(values.iter().map(|x| (x - mean) / (2.0 * spread)).collect());
     }
-    let product =
-        |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x * y).collect() };
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(x, y)| x * y).collect() };
     // Signs and shapes alone, a constant, the variables, and their products.
     let mut features: Vec<Vec<f64>> = signs.iter().cloned().chain(shapes).collect();
     features.push(vec![1.0; picked.len()]);
@@ -248,9 +222,7 @@ fn hinges(values: &[f64], spread: f64) -> Vec<Vec<f64>> {
     let last = sorted.len() - 1;
     let beyond = |at: usize, sign: f64| -> Vec<f64> {
         let place = sorted[at];
-        let over = values
-            .iter()
-            .map(|x| (sign * (x - place)).max(0.0) / spread);
+        let over = values.iter().map(|x| (sign * (x - place)).max(0.0) / spread);
         over.collect()
     };
     let places = HINGE_QUANTILES.iter().flat_map(|share| {
@@ -311,16 +283,10 @@ mod tests {
         let q: Vec<f64> = (0..n).map(|i| (1.7 * time(i)).sin()).collect();
         let p: Vec<f64> = (0..n).map(|i| (2.9 * time(i)).cos()).collect();
         let mut noise = TestNoise::new(11);
-        let law: Vec<f64> = (0..n)
-            .map(|i| q[i] * p[i] * p[i] + 0.3 * noise.normal())
-            .collect();
+        let law: Vec<f64> = (0..n).map(|i| q[i] * p[i] * p[i] + 0.3 * noise.normal()).collect();
         let white: Vec<f64> = (0..n).map(|_| noise.normal()).collect();
         let size = law.iter().map(|x| x * x).sum::<f64>() / n as f64;
-        let found = repeatable_shares(
-            &layout,
-            &[("q".into(), q), ("p_d".into(), p)],
-            &[law, white],
-        );
+        let found = repeatable_shares(&layout, &[("q".into(), q), ("p_d".into(), p)], &[law, white]);
         let expected = 1.0 - 0.09 / size;
         assert!((found[0] - expected).abs() < 0.03, "{found:?} {expected}");
         assert!(found[1] < 0.01, "{found:?}");

@@ -8,9 +8,8 @@ use super::evidence::SelectionEvidence;
 use super::pool::FitScope;
 use super::problem::{ColumnSource, DiagnosisProblem};
 use super::thresholds::{
-    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE,
-    RIVAL_FINER_GAIN_FACTOR, RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE,
-    SIMPLER_SET_MOST_LOSS,
+    OTHER_KIND_SHARE, OTHER_SET_LEAST_ADVANTAGE, OTHER_SET_LEAST_GAIN, PLACE_PRICE, RIVAL_FINER_GAIN_FACTOR,
+    RIVAL_MOST_GRID_RATIO, RIVAL_MOST_RATIO, SIMPLER_KIND_SHARE, SIMPLER_SET_MOST_LOSS,
 };
 
 /// Sets that are followed at the same time (width of the beam).
@@ -185,9 +184,9 @@ impl EffectSelector<'_> {
         let chosen = self.first_supported_set(accepted, &mut additions, refused);
         // A set with other members must be much better than one that only grows.
         // Sets with other members are tested only if their criterion is far below.
-        let bound = chosen.as_ref().map_or(f64::INFINITY, |next| {
-            next.trial.score - OTHER_SET_LEAST_ADVANTAGE
-        });
+        let bound = chosen
+            .as_ref()
+            .map_or(f64::INFINITY, |next| next.trial.score - OTHER_SET_LEAST_ADVANTAGE);
         let mut others = exchanged.into_iter().filter(|t| t.score < bound);
         let other = self.first_supported_set(accepted, &mut others, &mut Vec::new());
         // Compare the other set directly with the grown one.
@@ -201,20 +200,12 @@ impl EffectSelector<'_> {
     }
 
     /// Evidence for the set `after` compared with `before`, on the channels on which they differ.
-    fn evidence_between(
-        &self,
-        before: &[SelectedEffect],
-        after: &[SelectedEffect],
-    ) -> SelectionEvidence {
+    fn evidence_between(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> SelectionEvidence {
         self.evidence(before, after, &self.differing_channels(before, after))
     }
 
     /// Channels on which effects act that only one of two sets has.
-    fn differing_channels(
-        &self,
-        before: &[SelectedEffect],
-        after: &[SelectedEffect],
-    ) -> Vec<usize> {
+    fn differing_channels(&self, before: &[SelectedEffect], after: &[SelectedEffect]) -> Vec<usize> {
         let mut differ = set_difference(after, before);
         differ.extend(set_difference(before, after));
         self.affected_channels(&differ)
@@ -222,11 +213,7 @@ impl EffectSelector<'_> {
 
     /// Whether the set `before` is clearly better than `settled`, which is to replace it. What was accepted step by
     /// step need not be significant again in total: a large gain that justifies its parameters is enough.
-    pub(crate) fn is_worse(
-        &mut self,
-        settled: &[SelectedEffect],
-        before: &[SelectedEffect],
-    ) -> bool {
+    pub(crate) fn is_worse(&mut self, settled: &[SelectedEffect], before: &[SelectedEffect]) -> bool {
         self.weigh_channels(before);
         let channels: Vec<usize> = (0..self.weights.len()).collect();
         self.evidence(settled, before, &channels).is_worth_keeping()
@@ -235,8 +222,7 @@ impl EffectSelector<'_> {
     /// Whether a trial adds exactly one effect to the accepted set; the new effect may replace members that it
     /// contains.
     fn is_addition(&self, accepted: &[SelectedEffect], trial: &ScoredEffectSet) -> bool {
-        let is_new =
-            |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         let mut news = trial.picks.iter().filter(is_new);
         let (Some(new), None) = (news.next(), news.next()) else {
             return false;
@@ -287,11 +273,7 @@ impl EffectSelector<'_> {
 
     /// All sets with one more effect than those in the beam, and the best pairs. The best of them are improved by
     /// exchanges. Returns at most 40, best first.
-    fn grow_sets(
-        &mut self,
-        accepted: &[SelectedEffect],
-        beam: &[Vec<SelectedEffect>],
-    ) -> Vec<ScoredEffectSet> {
+    fn grow_sets(&mut self, accepted: &[SelectedEffect], beam: &[Vec<SelectedEffect>]) -> Vec<ScoredEffectSet> {
         // One table of inner products serves all trials; the number of independent equations comes from the accepted
         // set.
         let all: Vec<SelectedEffect> = beam.iter().flatten().cloned().collect();
@@ -341,8 +323,7 @@ impl EffectSelector<'_> {
             .min_by(|a, b| a.squares.total_cmp(&b.squares))
             .map_or(worth, |best| {
                 let (factors, _) = self.fit(&best.picks, FitScope::All);
-                worth
-                    .max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
+                worth.max(self.effective_equations(&self.residual(&best.picks, &factors), &channels))
             });
         let problem = self.problem;
         // Sort by the criterion and keep the best sets.
@@ -398,10 +379,7 @@ impl EffectSelector<'_> {
                     None => break,
                 }
             }
-            if trials
-                .iter()
-                .all(|known| !is_same_set(&known.picks, &best.picks))
-            {
+            if trials.iter().all(|known| !is_same_set(&known.picks, &best.picks)) {
                 trials.push(best);
             }
         }
@@ -416,14 +394,8 @@ impl EffectSelector<'_> {
     /// The best pairs of further effects, added to the accepted set or to this set without one member. A pair may
     /// explain everything where neither effect explains much alone, and where an effect that two places share was
     /// accepted first.
-    fn best_pairs(
-        &self,
-        accepted: &[SelectedEffect],
-        table: &ProjectedGram,
-        worth: f64,
-    ) -> Vec<ScoredEffectSet> {
-        let is_new =
-            |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
+    fn best_pairs(&self, accepted: &[SelectedEffect], table: &ProjectedGram, worth: f64) -> Vec<ScoredEffectSet> {
+        let is_new = |pick: &&SelectedEffect| accepted.iter().all(|p| p.candidate != pick.candidate);
         // Weighted squared residual of the accepted set with one more effect.
         let alone = |pick: &SelectedEffect| {
             let mut set = accepted.to_vec();
@@ -433,8 +405,7 @@ impl EffectSelector<'_> {
         // Only effects with at most two estimated numbers take part in pairs.
         let simple = self.current_choices.iter().flatten().filter(is_new);
         let simple = simple.filter(|pick| self.freedoms(pick) <= 2);
-        let mut further: Vec<(f64, &SelectedEffect)> =
-            simple.map(|pick| (alone(pick), pick)).collect();
+        let mut further: Vec<(f64, &SelectedEffect)> = simple.map(|pick| (alone(pick), pick)).collect();
         further.sort_by(|a, b| a.0.total_cmp(&b.0));
         further.truncate(PAIRED);
         // The accepted set and every subset with one member less.
@@ -477,8 +448,7 @@ impl EffectSelector<'_> {
     /// grids, the wrong candidate may have been nearer to its best value.
     fn exchange_finely(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         // Whether a candidate has constants that are searched.
-        let is_searched =
-            |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
+        let is_searched = |bench: &Self, pick: &SelectedEffect| bench.candidate(pick).searched_constants > 0;
         let mut table = self.projected_gram(&picks);
         for i in 0..picks.len() {
             let mut others = picks.clone();
@@ -490,8 +460,7 @@ impl EffectSelector<'_> {
             let others_are_searched = others.iter().any(|other| is_searched(self, other));
             let is_kin = |bench: &Self, rival: &SelectedEffect| {
                 let [one, two] = [rival, &own].map(|pick| &bench.candidate(pick).effect);
-                others_are_searched
-                    && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
+                others_are_searched && (one.kind == two.kind || one.at.iter().any(|place| two.at.contains(place)))
             };
             // Rivals with no more estimated numbers, if one of both has searched constants or if they are similar
             // effects.
@@ -516,9 +485,7 @@ impl EffectSelector<'_> {
                 // A rival with a searched constant is compared at its own best constant.
                 let tuned = if is_searched(self, &set[i]) || is_kin(self, &set[i]) {
                     self.choose_constants(set)
-                } else if self.fit_from_gram(&table, set.clone()).squares
-                    > RIVAL_MOST_RATIO * best.squares
-                {
+                } else if self.fit_from_gram(&table, set.clone()).squares > RIVAL_MOST_RATIO * best.squares {
                     continue;
                 } else {
                     set
@@ -600,8 +567,7 @@ impl EffectSelector<'_> {
             if next.squares < best.squares {
                 let first = first?;
                 let news = set_difference(&first.picks, accepted);
-                let evidence =
-                    self.evidence(accepted, &first.picks, &self.affected_channels(&news));
+                let evidence = self.evidence(accepted, &first.picks, &self.affected_channels(&news));
                 return evidence.is_sufficient().then_some((first, evidence));
             }
         }
@@ -636,8 +602,7 @@ impl EffectSelector<'_> {
             trial.is_possible()
                 && Self::replaced_effects(accepted, &trial.picks).is_empty()
                 && simple.rank < own.rank
-                && self.candidate(simple).searched_constants
-                    <= self.candidate(own).searched_constants
+                && self.candidate(simple).searched_constants <= self.candidate(own).searched_constants
                 && (refines || self.is_in_conditional_span(simple, own, &beside))
         });
         // Simpler kinds that reach most of the gain of the best one.
@@ -685,10 +650,7 @@ impl EffectSelector<'_> {
     }
 
     /// Members of the accepted set that are not in `picks`.
-    fn replaced_effects(
-        accepted: &[SelectedEffect],
-        picks: &[SelectedEffect],
-    ) -> Vec<SelectedEffect> {
+    fn replaced_effects(accepted: &[SelectedEffect], picks: &[SelectedEffect]) -> Vec<SelectedEffect> {
         let gone = |pick: &&SelectedEffect| picks.iter().all(|p| p.candidate != pick.candidate);
         accepted.iter().filter(gone).cloned().collect()
     }
@@ -712,10 +674,7 @@ fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
     let twice = |(i, one): (usize, &SelectedEffect)| {
         let others = picks[i + 1..].iter().filter(|other| {
             effect(one).kind == effect(other).kind
-                && effect(one)
-                    .at
-                    .iter()
-                    .any(|place| effect(other).at.contains(place))
+                && effect(one).at.iter().any(|place| effect(other).at.contains(place))
         });
         others.count() as f64
     };
@@ -724,10 +683,7 @@ fn overlap(problem: &DiagnosisProblem, picks: &[SelectedEffect]) -> f64 {
 }
 
 /// Members of a set whose candidate is not in another; the complete set if there are none.
-pub(crate) fn set_difference(
-    set: &[SelectedEffect],
-    other: &[SelectedEffect],
-) -> Vec<SelectedEffect> {
+pub(crate) fn set_difference(set: &[SelectedEffect], other: &[SelectedEffect]) -> Vec<SelectedEffect> {
     let is_new = |pick: &&SelectedEffect| other.iter().all(|p| p.candidate != pick.candidate);
     let new: Vec<SelectedEffect> = set.iter().filter(is_new).cloned().collect();
     if new.is_empty() { set.to_vec() } else { new }

@@ -44,8 +44,7 @@ impl WithSimd for ProductTile<'_> {
     )]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let [rows, columns] =
-            [self.rows, self.columns].map(|all| all.map(|one| S::as_simd_f64s(one).0));
+        let [rows, columns] = [self.rows, self.columns].map(|all| all.map(|one| S::as_simd_f64s(one).0));
         // Equal lengths known to the compiler save bounds checks.
         let n = rows[0].len();
         let [rows, columns] = [rows, columns].map(|all| all.map(|one| &one[..n]));
@@ -83,11 +82,7 @@ mod tests {
     #[test]
     fn a_tile_has_the_bits_of_single_products() {
         for samples in [0, 1, 15, 16, 63, 64, 65, 1000, 1003] {
-            let values = |k: usize| -> Vec<f64> {
-                (0..samples)
-                    .map(|i| ((i * (k + 3)) as f64 * 0.37).sin())
-                    .collect()
-            };
+            let values = |k: usize| -> Vec<f64> { (0..samples).map(|i| ((i * (k + 3)) as f64 * 0.37).sin()).collect() };
             let all: Vec<Vec<f64>> = (0..2 * SIDE).map(values).collect();
             let rows: [&[f64]; SIDE] = array::from_fn(|r| all[r].as_slice());
             let columns: [&[f64]; SIDE] = array::from_fn(|c| all[SIDE + c].as_slice());

@@ -10,10 +10,7 @@ const COARSE_SEARCH_FACTOR: f64 = 4.0;
 
 impl EffectSelector<'_> {
     /// Chooses the constants of each effect of a set from its grid, with the other effects fixed; two rounds at most.
-    pub(crate) fn choose_constants(
-        &mut self,
-        mut picks: Vec<SelectedEffect>,
-    ) -> Vec<SelectedEffect> {
+    pub(crate) fn choose_constants(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let problem = self.problem;
         // The constants of one effect depend on those of the others, so there is a second round.
         for _ in 0..2 {
@@ -51,20 +48,14 @@ impl EffectSelector<'_> {
 
     /// The same for one new member and for members that act on the same channels. Other members are affected through
     /// the base only.
-    pub(crate) fn refine_around_member(
-        &mut self,
-        picks: Vec<SelectedEffect>,
-        member: usize,
-    ) -> Vec<SelectedEffect> {
+    pub(crate) fn refine_around_member(&mut self, picks: Vec<SelectedEffect>, member: usize) -> Vec<SelectedEffect> {
         let channels = self.affected_channels(&picks[member..=member]);
         // Members that act on at least one of the channels of the new one.
         let acts_there = |pick: &SelectedEffect| {
             let own = self.affected_channels(std::slice::from_ref(pick));
             own.iter().any(|channel| channels.contains(channel))
         };
-        let near: Vec<usize> = (0..picks.len())
-            .filter(|i| acts_there(&picks[*i]))
-            .collect();
+        let near: Vec<usize> = (0..picks.len()).filter(|i| acts_there(&picks[*i])).collect();
         self.refine_members(picks, near)
     }
 
@@ -86,14 +77,8 @@ impl EffectSelector<'_> {
             let (name, value) = (name.clone(), *value);
             // Values of the constant that are known already.
             let mut grid: Vec<f64> = match &problem.candidates[candidate].source {
-                ColumnSource::Columns(choices) => {
-                    choices.iter().map(|c| c.constants[0].1).collect()
-                }
-                ColumnSource::LoadDependent => vec![
-                    value / COARSE_SEARCH_FACTOR,
-                    value,
-                    value * COARSE_SEARCH_FACTOR,
-                ],
+                ColumnSource::Columns(choices) => choices.iter().map(|c| c.constants[0].1).collect(),
+                ColumnSource::LoadDependent => vec![value / COARSE_SEARCH_FACTOR, value, value * COARSE_SEARCH_FACTOR],
                 _ => continue,
             };
             // The grid limits the search: its ends and the neighbours of the present value.
@@ -131,8 +116,7 @@ impl EffectSelector<'_> {
             others.remove(i);
             let beside = self.conditioning_set(&others);
             // The load is that of the set with its present constants.
-            let load = (problem.candidates[candidate].source == ColumnSource::LoadDependent)
-                .then(|| self.load(&picks));
+            let load = (problem.candidates[candidate].source == ColumnSource::LoadDependent).then(|| self.load(&picks));
             // What the effect explains in addition to the others with one value of the constant; `None` if it has no
             // columns there.
             let at = |x: f64| -> Option<(f64, Vec<ForceColumn>)> {
@@ -174,11 +158,7 @@ const MAX_EVALUATIONS: usize = 14;
 /// Maximum of a function between two bounds: its position and the value there, with what `at` returned. Uses parabolas
 /// through the best three points, and golden section steps where these fail (R. P. Brent, Algorithms for Minimization
 /// without Derivatives, 1973, ch. 5). `None` if the function has no value at a point.
-fn maximise<T>(
-    mut low: f64,
-    mut high: f64,
-    at: &dyn Fn(f64) -> Option<(f64, T)>,
-) -> Option<(f64, (f64, T))> {
+fn maximise<T>(mut low: f64, mut high: f64, at: &dyn Fn(f64) -> Option<(f64, T)>) -> Option<(f64, (f64, T))> {
     let golden = 0.5 * (3.0 - 5.0_f64.sqrt());
     // Tolerance of the position.
     let near = NEAR * (high - low);
@@ -212,12 +192,7 @@ fn maximise<T>(
             (side, golden * side)
         };
         // Points closer than the tolerance are not distinguished.
-        let x = best
-            + if step.abs() < near {
-                near.copysign(step)
-            } else {
-                step
-            };
+        let x = best + if step.abs() < near { near.copysign(step) } else { step };
         let of_x = at(x)?;
         // Narrow the interval and keep the three best points.
         if of_x.0 >= of_best.0 {

@@ -84,10 +84,7 @@ impl NominalBodyMatrix {
             .filter(|inverse| inverse.iter().all(|x| x.is_finite()))
             .ok_or_else(impossible)?;
         let copies = body.copies;
-        Ok(Self {
-            root_inverse,
-            copies,
-        })
+        Ok(Self { root_inverse, copies })
     }
 
     /// `L^-1 P L'^-1`, the identity at the nominal values.

@@ -77,9 +77,7 @@ pub fn uncertainty_with_autocorrelation<E: From<LeastSquaresError>>(
     mut show: impl FnMut(&mut RowVisitor<'_>) -> Result<(), E>,
 ) -> Result<ParameterUncertainty, E> {
     let mut scores = InfluenceScores::new(solution, channels.max(1));
-    from_influences(solution, channels, |take| {
-        scores.show_influences(&mut show, take)
-    })
+    from_influences(solution, channels, |take| scores.show_influences(&mut show, take))
 }
 
 /// Receives each sample's influence on the parameters and its residuals.
@@ -105,9 +103,7 @@ pub(crate) fn from_influences<E>(
     })?;
 
     // Second pass: prewhitened influences, summed with Bartlett's kernel.
-    let whitening: Vec<f64> = (0..n)
-        .map(|j| memory.correlation(1, j).clamp(-0.97, 0.97))
-        .collect();
+    let whitening: Vec<f64> = (0..n).map(|j| memory.correlation(1, j).clamp(-0.97, 0.97)).collect();
     let bandwidth = bandwidth(&memory, &whitening, lags, steps);
 
     let mut windows = BartlettWindows::new(n, bandwidth);
@@ -116,12 +112,7 @@ pub(crate) fn from_influences<E>(
     let mut first = true;
     run(&mut |influence, _| {
         for j in 0..n {
-            white[j] = influence[j]
-                - if first {
-                    0.0
-                } else {
-                    whitening[j] * previous[j]
-                };
+            white[j] = influence[j] - if first { 0.0 } else { whitening[j] * previous[j] };
         }
         previous.copy_from_slice(influence);
         first = false;
@@ -166,9 +157,7 @@ pub(crate) fn from_influences<E>(
         std,
         covariance,
         effective_samples,
-        residual_lag1: (0..channels)
-            .map(|channel| residuals.correlation(1, channel))
-            .collect(),
+        residual_lag1: (0..channels).map(|channel| residuals.correlation(1, channel)).collect(),
         bandwidth,
         samples,
         few_samples,
@@ -233,11 +222,7 @@ impl<'a> InfluenceScores<'a> {
                 // Gradient of the sample: its rows times their residuals, summed over the channels.
                 gradient.fill(0.0);
                 for (channel, row) in sample.chunks_exact(n).enumerate() {
-                    let model: f64 = row
-                        .iter()
-                        .zip(&self.solution.values)
-                        .map(|(w, p)| w * p)
-                        .sum();
+                    let model: f64 = row.iter().zip(&self.solution.values).map(|(w, p)| w * p).sum();
                     let error = measured[channel] - model;
                     errors[channel] = error;
                     for (g, w) in gradient.iter_mut().zip(row) {
@@ -327,8 +312,7 @@ mod tests {
             let mut expected = 0.0;
             for s in 0..50_usize {
                 for t in 0..50_usize {
-                    expected +=
-                        (1.0 - s.abs_diff(t) as f64 / length as f64).max(0.0) * u[s][i] * u[t][j];
+                    expected += (1.0 - s.abs_diff(t) as f64 / length as f64).max(0.0) * u[s][i] * u[t][j];
                 }
             }
             assert!((sum[(i, j)] - expected).abs() < 1e-10);
@@ -361,14 +345,11 @@ mod tests {
             let mut regression = LeastSquares::new(3);
             regression.add_rows(&w, &y).unwrap();
             let solution = regression.solve().unwrap();
-            let honest =
-                uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y))
-                    .unwrap();
+            let honest = uncertainty_with_autocorrelation(&solution, channels, |visit| visit(&w, &y)).unwrap();
             for j in 0..3 {
                 let error = (solution.values[j] - truth[j]).abs();
                 hits.0[j] += f64::from(u8::from(error <= 2.0 * honest.std[j])) / f64::from(trials);
-                hits.1[j] += f64::from(u8::from(error <= 2.0 * solution.classical_std[j]))
-                    / f64::from(trials);
+                hits.1[j] += f64::from(u8::from(error <= 2.0 * solution.classical_std[j])) / f64::from(trials);
             }
         }
         hits
@@ -378,19 +359,14 @@ mod tests {
     fn two_deviations_cover_95_percent_under_autocorrelation() {
         for (correlation, channels) in [(0.0, 1), (0.7, 1), (0.9, 1), (0.9, 2)] {
             let (honest, classical) = coverage(correlation, channels);
-            println!(
-                "correlation {correlation}, {channels} channels: honest {honest:.3?}, classical {classical:.3?}"
-            );
+            println!("correlation {correlation}, {channels} channels: honest {honest:.3?}, classical {classical:.3?}");
             for j in 0..3 {
                 assert!(
                     (0.90..=0.985).contains(&honest[j]),
                     "correlation {correlation}: {honest:?}"
                 );
                 if correlation >= 0.7 {
-                    assert!(
-                        classical[j] < 0.80,
-                        "correlation {correlation}: {classical:?}"
-                    );
+                    assert!(classical[j] < 0.80, "correlation {correlation}: {classical:?}");
                 }
             }
         }
@@ -398,20 +374,15 @@ mod tests {
 
     #[test]
     fn what_is_not_determined_has_no_finite_deviation() {
-        let w: Vec<f64> = (0..100)
-            .flat_map(|i| [1.0, f64::from(i % 3), 0.0])
-            .collect();
+        let w: Vec<f64> = (0..100).flat_map(|i| [1.0, f64::from(i % 3), 0.0]).collect();
         let y: Vec<f64> = (0..100).map(|i| f64::from(i % 5)).collect();
         let mut regression = LeastSquares::new(3);
         regression.add_rows(&w, &y).unwrap();
         let solution = regression.solve().unwrap();
-        let deviations =
-            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
+        let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w, &y)).unwrap();
         assert!(deviations.std[0].is_finite() && deviations.std[1].is_finite());
         assert!(deviations.std[2].is_infinite());
-        let other =
-            uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10]))
-                .unwrap_err();
+        let other = uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&w[..30], &y[..10])).unwrap_err();
         assert_eq!(
             other,
             LeastSquaresError::PassesDiffer {

@@ -56,12 +56,7 @@ impl MisfitFunction<'_> {
             let trace = relative.trace();
             let n = relative.nrows() as f64;
             let cholesky = relative.cholesky()?;
-            let log_det: f64 = cholesky
-                .l_dirty()
-                .diagonal()
-                .iter()
-                .map(|d| 2.0 * d.ln())
-                .sum();
+            let log_det: f64 = cholesky.l_dirty().diagonal().iter().map(|d| 2.0 * d.ln()).sum();
             value += weight * (trace - log_det - n) / reference.copies;
         }
         value.is_finite().then_some(value)
@@ -96,8 +91,7 @@ impl MisfitFunction<'_> {
             }
             let factor = weight / reference.copies;
             // Gradient tr(S) - tr(P^-1 S) and second derivative tr(P^-1 S_i P^-1 S_j) of the divergence.
-            let turned: Vec<DMatrix<f64>> =
-                slopes.iter().map(|(_, slope)| &inverse * slope).collect();
+            let turned: Vec<DMatrix<f64>> = slopes.iter().map(|(_, slope)| &inverse * slope).collect();
             for (k, (i, slope)) in slopes.iter().enumerate() {
                 gradient[*i] += factor * (slope.trace() - turned[k].trace());
                 for (l, (j, _)) in slopes.iter().enumerate().take(k + 1) {
@@ -119,16 +113,10 @@ impl MisfitFunction<'_> {
 
     /// Minimises by the Levenberg-Marquardt method, with steps that keep all bodies possible. Returns the number of
     /// iterations.
-    pub(crate) fn minimise(
-        &self,
-        x: &mut DVector<f64>,
-        weight: f64,
-    ) -> Result<usize, PhysicalError> {
+    pub(crate) fn minimise(&self, x: &mut DVector<f64>, weight: f64) -> Result<usize, PhysicalError> {
         let mut damping = 1e-9;
         for iteration in 0..500 {
-            let point = self
-                .evaluate_at(x, weight)
-                .ok_or(PhysicalError::NoConvergence)?;
+            let point = self.evaluate_at(x, weight).ok_or(PhysicalError::NoConvergence)?;
             let second = &point.data + &point.prior;
             let mut moved = false;
             while !moved && damping < 1e9 {
@@ -182,9 +170,7 @@ impl MisfitFunction<'_> {
 
 /// Solves a positive definite system after scaling its diagonal to 1, since parameters differ in units.
 fn solve_scaled(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 1.0 });
     let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
         scale[i] * matrix[(i, j)] * scale[j]
     });

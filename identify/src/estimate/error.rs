@@ -60,14 +60,24 @@ impl fmt::Display for LeastSquaresError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoParameters => f.write_str("there is no parameter to identify; the regressor has no columns"),
-            Self::Shape { regressor, measured, columns } => write!(
+            Self::Shape {
+                regressor,
+                measured,
+                columns,
+            } => write!(
                 f,
                 "the regressor has {regressor} numbers, but {measured} measured values need {measured} rows of {columns} columns"
             ),
             Self::Channels { rows, channels } => {
-                write!(f, "{rows} rows are not complete samples of {channels} channels; pass complete samples in each block")
+                write!(
+                    f,
+                    "{rows} rows are not complete samples of {channels} channels; pass complete samples in each block"
+                )
             }
-            Self::NotFinite { row, column: Some(column) } => write!(
+            Self::NotFinite {
+                row,
+                column: Some(column),
+            } => write!(
                 f,
                 "column {column} of the regressor is not finite in row {row}; \
                  check whether the mechanism is out of reach or singular there"
@@ -77,9 +87,9 @@ impl fmt::Display for LeastSquaresError {
             Self::NominalLength { have, expected } => {
                 write!(f, "{have} nominal values were given for {expected} parameters")
             }
-            Self::NoConvergence => f.write_str(
-                "the singular values do not converge; the numbers of the regressor differ too much in size",
-            ),
+            Self::NoConvergence => {
+                f.write_str("the singular values do not converge; the numbers of the regressor differ too much in size")
+            }
             Self::WeakInstruments { correlation } => write!(
                 f,
                 "the instruments do not determine the parameters: the smallest canonical correlation between them and the \
@@ -119,9 +129,9 @@ impl fmt::Display for PhysicalError {
                 "the nominal values of {body} are physically impossible: {why}; give values that a body can have, for \
                  example from a CAD system"
             ),
-            Self::NoConvergence => {
-                f.write_str("the search for physical parameters did not converge; check the magnitudes of the nominal values")
-            }
+            Self::NoConvergence => f.write_str(
+                "the search for physical parameters did not converge; check the magnitudes of the nominal values",
+            ),
         }
     }
 }

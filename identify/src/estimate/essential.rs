@@ -117,13 +117,7 @@ pub fn select_essential(
             .map(|i| choice.relative_std(held, i))
             .collect();
         // Candidate: the parameter with the largest relative standard deviation.
-        let worst = (0..relative.len()).fold(0, |best, i| {
-            if relative[i] > relative[best] {
-                i
-            } else {
-                best
-            }
-        });
+        let worst = (0..relative.len()).fold(0, |best, i| if relative[i] > relative[best] { i } else { best });
         if relative[worst] <= options.well_determined {
             break;
         }
@@ -199,11 +193,7 @@ impl ReducedRegression {
         let value = held[self.columns[i]] + self.solution.values[i];
         let relative = self.covariance[(i, i)].sqrt() / value.abs();
         // A parameter with neither value nor deviation is not needed.
-        if relative.is_nan() {
-            f64::INFINITY
-        } else {
-            relative
-        }
+        if relative.is_nan() { f64::INFINITY } else { relative }
     }
 
     /// Probability by Wald's test that several parameters have their fixed values.
@@ -240,9 +230,7 @@ fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
     if x > (a + 1.0) / (a + b + 2.0) {
         return 1.0 - incomplete_beta(1.0 - x, b, a);
     }
-    let front = (a * x.ln() + b * (1.0 - x).ln() + log_gamma(a + b) - log_gamma(a) - log_gamma(b))
-        .exp()
-        / a;
+    let front = (a * x.ln() + b * (1.0 - x).ln() + log_gamma(a + b) - log_gamma(a) - log_gamma(b)).exp() / a;
     let tiny = 1e-300;
     let away = |value: f64| if value.abs() < tiny { tiny } else { value };
     let (mut c, mut d) = (1.0, 1.0 / away(1.0 - (a + b) * x / (a + 1.0)));
@@ -342,11 +330,7 @@ mod tests {
             .unwrap();
             assert!(found.dropped.iter().any(|d| d.relative_std.is_infinite()));
             // Of the two equal columns one stays, whichever.
-            let kept: Vec<usize> = found
-                .kept
-                .iter()
-                .map(|j| if *j == 6 { 0 } else { *j })
-                .collect();
+            let kept: Vec<usize> = found.kept.iter().map(|j| if *j == 6 { 0 } else { *j }).collect();
             right += i32::from([1, 3, 5, 0].iter().all(|j| kept.contains(j)) && kept.len() == 4);
             for j in [1, 3, 5] {
                 assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
@@ -386,14 +370,7 @@ mod tests {
             assert!((found.values[j] - truth[j]).abs() < 5.0 * found.std[j]);
         }
         // A well determined parameter moves away from its fixed value.
-        let found = select_essential(
-            &triangle,
-            &solution,
-            &deviations,
-            &[1.0, 8.0, 5.0],
-            &options,
-        )
-        .unwrap();
+        let found = select_essential(&triangle, &solution, &deviations, &[1.0, 8.0, 5.0], &options).unwrap();
         assert_eq!(found.kept, [0, 2]);
     }
 }

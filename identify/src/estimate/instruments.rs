@@ -68,11 +68,7 @@ pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
                 gradient.fill(0.0);
                 for (channel, row) in sample.chunks_exact(2 * n).enumerate() {
                     let (z, w) = row.split_at(n);
-                    let model: f64 = w
-                        .iter()
-                        .zip(&found.solution.values)
-                        .map(|(w, p)| w * p)
-                        .sum();
+                    let model: f64 = w.iter().zip(&found.solution.values).map(|(w, p)| w * p).sum();
                     errors[channel] = measured[channel] - model;
                     for (g, z) in gradient.iter_mut().zip(z) {
                         *g += z * errors[channel];
@@ -87,11 +83,7 @@ pub fn estimate_with_instruments<E: From<LeastSquaresError>>(
             Ok(())
         } else {
             let (first, now) = (regression.rows(), rows);
-            Err(LeastSquaresError::PassesDiffer {
-                first,
-                this_pass: now,
-            }
-            .into())
+            Err(LeastSquaresError::PassesDiffer { first, this_pass: now }.into())
         }
     })?;
     Ok(InstrumentalEstimate {
@@ -112,10 +104,7 @@ struct InstrumentalSolution {
 }
 
 /// Solves for `n` parameters; fails if the instruments are too weak.
-fn solve_instrumental(
-    regression: &LeastSquares,
-    n: usize,
-) -> Result<InstrumentalSolution, LeastSquaresError> {
+fn solve_instrumental(regression: &LeastSquares, n: usize) -> Result<InstrumentalSolution, LeastSquaresError> {
     let width = 2 * n + 1;
     let triangle = regression.augmented_factor();
     let entry = |i: usize, j: usize| triangle[i * width + j];
@@ -157,9 +146,7 @@ fn solve_instrumental(
     let to_parameters = &b_inverse * r_inverse.transpose();
     solution.r_inverse = b_inverse;
     let sigma = solution.residual_variance().sqrt();
-    solution.classical_std = (0..n)
-        .map(|i| sigma * solution.r_inverse.row(i).norm())
-        .collect();
+    solution.classical_std = (0..n).map(|i| sigma * solution.r_inverse.row(i).norm()).collect();
     Ok(InstrumentalSolution {
         solution,
         least_squares,
@@ -191,10 +178,7 @@ mod tests {
     }
 
     fn found((rows, y): &Rows) -> InstrumentalEstimate {
-        estimate_with_instruments(2, 1, |visit| -> Result<(), LeastSquaresError> {
-            visit(rows, y)
-        })
-        .unwrap()
+        estimate_with_instruments(2, 1, |visit| -> Result<(), LeastSquaresError> { visit(rows, y) }).unwrap()
     }
 
     #[test]
@@ -222,23 +206,14 @@ mod tests {
     fn reflections_give_the_textbook_solution() {
         let (rows, y) = rows(3, 500);
         let table = DMatrix::from_row_slice(500, 4, &rows);
-        let (z, w) = (
-            table.columns(0, 2).clone_owned(),
-            table.columns(2, 2).clone_owned(),
-        );
+        let (z, w) = (table.columns(0, 2).clone_owned(), table.columns(2, 2).clone_owned());
         let y_vector = DVector::from_column_slice(&y);
-        let expected = (z.transpose() * &w)
-            .lu()
-            .solve(&(z.transpose() * y_vector))
-            .unwrap();
+        let expected = (z.transpose() * &w).lu().solve(&(z.transpose() * y_vector)).unwrap();
         let one = found(&(rows, y));
         for j in 0..2 {
             assert!((one.solution.values[j] - expected[j]).abs() < 1e-12 * expected[j].abs());
         }
-        let same: Vec<f64> = table
-            .row_iter()
-            .flat_map(|r| [r[2], r[3], r[2], r[3]])
-            .collect();
+        let same: Vec<f64> = table.row_iter().flat_map(|r| [r[2], r[3], r[2], r[3]]).collect();
         let plain = found(&(same, one_right(3)));
         for j in 0..2 {
             assert!((plain.solution.values[j] - plain.least_squares.values[j]).abs() < 1e-10);
@@ -259,9 +234,6 @@ mod tests {
             .collect();
         let y: Vec<f64> = (0..1000).map(f64::from).collect();
         let error = estimate_with_instruments(1, 1, |visit| visit(&rows, &y)).unwrap_err();
-        assert!(
-            matches!(error, LeastSquaresError::WeakInstruments { .. }),
-            "{error}"
-        );
+        assert!(matches!(error, LeastSquaresError::WeakInstruments { .. }), "{error}");
     }
 }

@@ -14,12 +14,7 @@ pub(crate) fn lags_for_bandwidth(samples: usize) -> usize {
 
 /// Automatic bandwidth, samples, from the lag products of the influences; prewhitening with the coefficients
 /// `whitening` is applied to the products.
-pub(crate) fn bandwidth(
-    memory: &LagProducts,
-    whitening: &[f64],
-    lags: usize,
-    samples: usize,
-) -> usize {
+pub(crate) fn bandwidth(memory: &LagProducts, whitening: &[f64], lags: usize, samples: usize) -> usize {
     let (mut curvature, mut power) = (0.0, 0.0);
     for (j, a) in whitening.iter().enumerate() {
         // Autocovariance of the prewhitened series.
@@ -32,10 +27,7 @@ pub(crate) fn bandwidth(
             continue;
         }
         let s0 = 1.0 + 2.0 * (1..=lags).map(|lag| gamma(lag) / variance).sum::<f64>();
-        let s1 = 2.0
-            * (1..=lags)
-                .map(|lag| lag as f64 * gamma(lag) / variance)
-                .sum::<f64>();
+        let s1 = 2.0 * (1..=lags).map(|lag| lag as f64 * gamma(lag) / variance).sum::<f64>();
         curvature += s1 * s1;
         power += s0 * s0;
     }
@@ -80,11 +72,7 @@ impl LagProducts {
         slot.clear();
         slot.extend_from_slice(values);
         self.recent.push_front(slot);
-        for (earlier, products) in self
-            .recent
-            .iter()
-            .zip(self.products.chunks_exact_mut(self.width))
-        {
+        for (earlier, products) in self.recent.iter().zip(self.products.chunks_exact_mut(self.width)) {
             for ((product, now), before) in products.iter_mut().zip(values).zip(earlier) {
                 *product += now * before;
             }
@@ -155,8 +143,7 @@ impl BartlettWindows {
 
     /// Adds the outer product of the present window.
     fn add_outer(&mut self) {
-        self.outer
-            .syger(1.0 / self.length as f64, &self.sum, &self.sum, 1.0);
+        self.outer.syger(1.0 / self.length as f64, &self.sum, &self.sum, 1.0);
     }
 
     /// The weighted sum; windows that extend beyond the last sample are included.

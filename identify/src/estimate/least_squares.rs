@@ -20,9 +20,7 @@ const BLOCK_NUMBERS: usize = 4096;
 
 /// Number of rows that are reduced together for a number of columns.
 fn block_rows(width: usize) -> usize {
-    (BLOCK_NUMBERS / width)
-        .clamp(64, 512)
-        .next_multiple_of(LANES)
+    (BLOCK_NUMBERS / width).clamp(64, 512).next_multiple_of(LANES)
 }
 
 /// A regression that takes its rows block by block.
@@ -103,11 +101,7 @@ impl LeastSquares {
     /// Adds rows: `regressor[row * n_parameters + column]` and `measured[row]`.
     /// To weight a row, scale it and its measured value.
     /// Fails if the lengths do not match or a number is not finite; then nothing is added.
-    pub fn add_rows(
-        &mut self,
-        regressor: &[f64],
-        measured: &[f64],
-    ) -> Result<(), LeastSquaresError> {
+    pub fn add_rows(&mut self, regressor: &[f64], measured: &[f64]) -> Result<(), LeastSquaresError> {
         let n = self.n_parameters;
         check_rows(regressor, measured, n, self.rows)?;
         let n_channels = self.channels.len();
@@ -156,10 +150,7 @@ impl LeastSquares {
                 columns: n,
             });
         }
-        let all = columns
-            .iter()
-            .map(|column| (*column, true))
-            .chain([(measured, false)]);
+        let all = columns.iter().map(|column| (*column, true)).chain([(measured, false)]);
         for (place, (column, is_regressor)) in all.enumerate() {
             if !all_finite(column)
                 && let Some(i) = column.iter().position(|value| !value.is_finite())
@@ -298,19 +289,14 @@ mod tests {
     fn streaming_equals_a_dense_solution() {
         let mut noise = TestNoise::new(1);
         let (n, rows) = (7, 1003);
-        let w = DMatrix::from_fn(rows, n, |i, j| {
-            (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap())
-        });
+        let w = DMatrix::from_fn(rows, n, |i, j| (i as f64 / 500.0 - 1.0).powi(i32::try_from(j).unwrap()));
         let y = DVector::from_fn(rows, |i, _| (i as f64 / 100.0).sin() + 0.1 * noise.normal());
         let flat: Vec<f64> = w.transpose().iter().copied().collect();
         let mut pieces = LeastSquares::new(n);
         let mut done = 0;
         for size in [1, 2, 300, 5, 255, 256, 184] {
             pieces
-                .add_rows(
-                    &flat[done * n..(done + size) * n],
-                    &y.as_slice()[done..done + size],
-                )
+                .add_rows(&flat[done * n..(done + size) * n], &y.as_slice()[done..done + size])
                 .unwrap();
             done += size;
         }
@@ -327,20 +313,12 @@ mod tests {
         let covariance = (w.transpose() * &w).try_inverse().unwrap();
         let variance = (&w * &dense - &y).norm_squared() / (rows - n) as f64;
         for j in 0..n {
-            near(
-                solution.classical_std[j],
-                (variance * covariance[(j, j)]).sqrt(),
-                1e-9,
-            );
+            near(solution.classical_std[j], (variance * covariance[(j, j)]).sqrt(), 1e-9);
         }
         let mut halves = LeastSquares::new(n);
         let mut second = LeastSquares::new(n);
-        halves
-            .add_rows(&flat[..401 * n], &y.as_slice()[..401])
-            .unwrap();
-        second
-            .add_rows(&flat[401 * n..], &y.as_slice()[401..])
-            .unwrap();
+        halves.add_rows(&flat[..401 * n], &y.as_slice()[..401]).unwrap();
+        second.add_rows(&flat[401 * n..], &y.as_slice()[401..]).unwrap();
         halves.merge(second).unwrap();
         assert_eq!(halves.rows(), rows);
         near(halves.solve().unwrap().values[3], dense[3], 1e-11);
@@ -354,13 +332,7 @@ mod tests {
         let (n, samples) = (11, 777);
         let sees = |channel: usize, j: usize| j >= 4 * channel;
         let w: Vec<f64> = (0..3 * samples * n)
-            .map(|i| {
-                if sees(i / n % 3, i % n) {
-                    noise.normal()
-                } else {
-                    0.0
-                }
-            })
+            .map(|i| if sees(i / n % 3, i % n) { noise.normal() } else { 0.0 })
             .collect();
         let y: Vec<f64> = (0..3 * samples).map(|_| noise.normal()).collect();
         let mut by_rows = LeastSquares::new(n);
@@ -415,9 +387,7 @@ mod tests {
         for i in 0..1000 {
             let t = f64::from(i) / 1000.0;
             let row = [1.0, 1.0 + 1e-8 * t];
-            regression
-                .add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]])
-                .unwrap();
+            regression.add_rows(&row, &[3.0 * row[0] - 2.0 * row[1]]).unwrap();
         }
         let solution = regression.solve().unwrap();
         near(solution.values[0], 3.0, 1e-6);
@@ -472,16 +442,8 @@ mod tests {
                 column: Some(1)
             }
         );
-        let error = regression
-            .add_rows(&[1.0, 2.0], &[f64::INFINITY])
-            .unwrap_err();
-        assert_eq!(
-            error,
-            LeastSquaresError::NotFinite {
-                row: 0,
-                column: None
-            }
-        );
+        let error = regression.add_rows(&[1.0, 2.0], &[f64::INFINITY]).unwrap_err();
+        assert_eq!(error, LeastSquaresError::NotFinite { row: 0, column: None });
         assert_eq!(regression.rows(), 0);
         assert_eq!(
             LeastSquares::new(0).solve().unwrap_err(),

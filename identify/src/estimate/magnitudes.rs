@@ -30,12 +30,7 @@ impl MagnitudeHistogram {
     pub(crate) fn median(&self) -> f64 {
         let half = self.total as f64 / 2.0;
         let mut before = 0.0;
-        for (at, count) in self
-            .counts
-            .iter()
-            .enumerate()
-            .filter(|(_, count)| **count > 0)
-        {
+        for (at, count) in self.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
             let count = *count as f64;
             if before + count >= half {
                 let (low, high) = (bin_edge(at), bin_edge(at + 1));

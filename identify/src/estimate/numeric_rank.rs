@@ -102,10 +102,7 @@ pub fn condition_number(w: &DMatrix<f64>) -> Result<Option<f64>, LeastSquaresErr
 /// Chooses `rank` columns by QR with column pivoting on columns of norm 1, with the numeric factors of the others: the
 /// fallback without an exact reduction.
 /// Fails if an entry is not finite or there are no columns; `rank` is limited to the possible rank.
-pub fn reduce_numerically(
-    w: &DMatrix<f64>,
-    rank: usize,
-) -> Result<NumericReduction, LeastSquaresError> {
+pub fn reduce_numerically(w: &DMatrix<f64>, rank: usize) -> Result<NumericReduction, LeastSquaresError> {
     let (scaled, norms) = scale(w)?;
     let n = w.ncols();
     let rank = rank
@@ -224,10 +221,7 @@ mod tests {
     fn the_rank_stands_at_the_gap() {
         let rank = numeric_rank(&sample()).unwrap();
         assert_eq!(rank.rank, 3);
-        assert!(
-            rank.gap > 1e10 && rank.scaled_condition_number < 10.0,
-            "{rank:?}"
-        );
+        assert!(rank.gap > 1e10 && rank.scaled_condition_number < 10.0, "{rank:?}");
         assert_eq!(rank.singular_values.len(), 6);
         let full = numeric_rank(&sample().columns(0, 3).into_owned()).unwrap();
         assert_eq!(full.rank, 3);
@@ -258,10 +252,7 @@ mod tests {
             let row: Vec<f64> = row.iter().copied().collect();
             regression.add_rows(&row, &[0.0]).unwrap();
         }
-        let (direct, streamed) = (
-            numeric_rank(&w).unwrap(),
-            numeric_rank(&regression.r_factor()).unwrap(),
-        );
+        let (direct, streamed) = (numeric_rank(&w).unwrap(), numeric_rank(&regression.r_factor()).unwrap());
         assert_eq!(direct.rank, streamed.rank);
         for (a, b) in direct.singular_values.iter().zip(&streamed.singular_values) {
             assert!((a - b).abs() < 1e-13);
@@ -306,10 +297,7 @@ mod tests {
             regression.add_rows(&row, &[row[0] + 2.0 * row[1]]).unwrap();
         }
         let solution = regression.solve_near(&[0.0, 0.0, 7.0]).unwrap();
-        assert_eq!(
-            (solution.rank, solution.values[2].to_bits()),
-            (2, 7.0_f64.to_bits())
-        );
+        assert_eq!((solution.rank, solution.values[2].to_bits()), (2, 7.0_f64.to_bits()));
         assert_eq!(solution.determined, [true, true, false]);
         assert!((solution.values[1] - 2.0).abs() < 1e-6);
     }
@@ -320,18 +308,7 @@ mod tests {
         assert!(numeric_rank(&DMatrix::zeros(0, 3)).is_err());
         assert!(numeric_rank(&DMatrix::from_element(3, 2, f64::NAN)).is_err());
         assert_eq!(numeric_rank(&DMatrix::zeros(5, 3)).unwrap().rank, 0);
-        assert_eq!(
-            reduce_numerically(&DMatrix::zeros(5, 3), 2)
-                .unwrap()
-                .kept
-                .len(),
-            0
-        );
-        assert_eq!(
-            numeric_rank(&DMatrix::from_element(2, 5, 1.0))
-                .unwrap()
-                .rank,
-            1
-        );
+        assert_eq!(reduce_numerically(&DMatrix::zeros(5, 3), 2).unwrap().kept.len(), 0);
+        assert_eq!(numeric_rank(&DMatrix::from_element(2, 5, 1.0)).unwrap().rank, 1);
     }
 }

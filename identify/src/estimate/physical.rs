@@ -101,9 +101,7 @@ pub fn physical_parameters(
         iterations += problem.minimise(&mut x, weight)?;
     }
     // Uncertainty if nominal values may be wrong by their own size.
-    let point = problem
-        .evaluate_at(&x, 1.0)
-        .ok_or(PhysicalError::NoConvergence)?;
+    let point = problem.evaluate_at(&x, 1.0).ok_or(PhysicalError::NoConvergence)?;
     let inverse = pseudo_inverse(&(&point.data + &point.prior));
     let before = pseudo_inverse(&point.prior);
     let (p, slopes) = base(x.as_slice());
@@ -124,11 +122,7 @@ pub fn physical_parameters(
         individually_determined: individually_determined(&(&problem.r * &slopes)),
         residual_norm: misfit.norm().hypot(triangle.residual_norm()),
         base: p.iter().copied().collect(),
-        base_std: spread
-            .diagonal()
-            .iter()
-            .map(|v| v.max(0.0).sqrt())
-            .collect(),
+        base_std: spread.diagonal().iter().map(|v| v.max(0.0).sqrt()).collect(),
         margins: problem
             .references
             .iter()
@@ -172,9 +166,7 @@ fn individually_determined(rows: &DMatrix<f64>) -> Vec<bool> {
 /// Pseudo-inverse of a symmetric matrix with its diagonal scaled to 1; directions without information are left out.
 fn pseudo_inverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let n = matrix.nrows();
-    let scale = matrix
-        .diagonal()
-        .map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+    let scale = matrix.diagonal().map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
     let scaled = DMatrix::from_fn(n, n, |i, j| scale[i] * matrix[(i, j)] * scale[j]);
     let eigen = scaled.symmetric_eigen();
     let mut inverse = DMatrix::zeros(n, n);
@@ -200,11 +192,7 @@ mod tests {
         let mut body = [0.0; 10];
         for _ in 0..6 {
             let m = noise.uniform();
-            let [x, y, z] = [
-                0.3 * noise.normal(),
-                0.2 * noise.normal(),
-                0.1 + 0.4 * noise.normal(),
-            ];
+            let [x, y, z] = [0.3 * noise.normal(), 0.2 * noise.normal(), 0.1 + 0.4 * noise.normal()];
             let one = [
                 m,
                 m * x,
@@ -225,11 +213,7 @@ mod tests {
     }
 
     fn matrix_of(x: &[f64]) -> DMatrix<f64> {
-        pseudo_inertia(
-            x[0],
-            [x[1], x[2], x[3]],
-            [x[4], x[5], x[6], x[7], x[8], x[9]],
-        )
+        pseudo_inertia(x[0], [x[1], x[2], x[3]], [x[4], x[5], x[6], x[7], x[8], x[9]])
     }
 
     /// Two bodies; of their 20 parameters 14 combinations are seen through a random regressor with noise.
@@ -251,9 +235,7 @@ mod tests {
         let (mut w, mut y) = (Vec::new(), Vec::new());
         for _ in 0..400 {
             let row: Vec<f64> = (0..14).map(|_| noise.normal()).collect();
-            y.push(
-                row.iter().zip(p.iter()).map(|(w, p)| w * p).sum::<f64>() + sigma * noise.normal(),
-            );
+            y.push(row.iter().zip(p.iter()).map(|(w, p)| w * p).sum::<f64>() + sigma * noise.normal());
             w.extend(row);
         }
         let mut regression = LeastSquares::new(14);
@@ -282,25 +264,13 @@ mod tests {
         let solution = case.regression.solve().unwrap();
         let deviations: Result<ParameterUncertainty, LeastSquaresError> =
             uncertainty_with_autocorrelation(&solution, 1, |visit| visit(&case.w, &case.y));
-        (
-            RFactor::new(&case.regression),
-            solution,
-            deviations.unwrap(),
-        )
+        (RFactor::new(&case.regression), solution, deviations.unwrap())
     }
 
     fn find(case: &Case) -> PhysicalParameters {
         let (triangle, solution, deviations) = solved(case);
         let base = |x: &[f64]| (&case.map * DVector::from_column_slice(x), case.map.clone());
-        physical_parameters(
-            &triangle,
-            &solution,
-            &deviations,
-            &case.nominal,
-            &base,
-            &bodies(),
-        )
-        .unwrap()
+        physical_parameters(&triangle, &solution, &deviations, &case.nominal, &base, &bodies()).unwrap()
     }
 
     #[test]
@@ -314,10 +284,7 @@ mod tests {
             }
             assert!(found.margins.iter().all(|margin| *margin > 0.0));
             // The truth is possible and fits to the noise, so that possible parameters can as well.
-            assert!(
-                found.residual_norm < 1.05 * solution.residual_norm,
-                "seed {seed}"
-            );
+            assert!(found.residual_norm < 1.05 * solution.residual_norm, "seed {seed}");
             assert!(found.residual_norm >= solution.residual_norm * (1.0 - 1e-9));
             let p = &case.map * DVector::from_column_slice(&case.truth);
             for (found, p) in found.base.iter().zip(p.iter()) {
@@ -332,29 +299,20 @@ mod tests {
         let case = case(40, 3.0);
         let (triangle, solution, deviations) = solved(&case);
         let found = find(&case);
-        let noise =
-            (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
+        let noise = (solution.residual_variance() * variance_inflation(&solution, &deviations)).sqrt();
         let references: Vec<NominalBodyMatrix> = bodies()
             .iter()
             .map(|body| NominalBodyMatrix::new(body, &case.nominal).unwrap())
             .collect();
         let objective = |x: &[f64]| -> f64 {
-            let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x))
-                - triangle.right_side())
-                / noise;
+            let misfit = (triangle.r() * (&case.map * DVector::from_column_slice(x)) - triangle.right_side()) / noise;
             let prior: f64 = (0..2)
                 .map(|k| {
                     let relative = references[k].relative(&matrix_of(&x[10 * k..10 * k + 10]));
                     let eigenvalues = relative.symmetric_eigenvalues();
                     eigenvalues
                         .iter()
-                        .map(|l| {
-                            if *l > 0.0 {
-                                l - l.ln() - 1.0
-                            } else {
-                                f64::INFINITY
-                            }
-                        })
+                        .map(|l| if *l > 0.0 { l - l.ln() - 1.0 } else { f64::INFINITY })
                         .sum::<f64>()
                 })
                 .sum();
@@ -364,11 +322,7 @@ mod tests {
         let mut random = TestNoise::new(9);
         for size in [1e-1, 1e-2, 1e-3, 1e-4] {
             for _ in 0..2000 {
-                let near: Vec<f64> = found
-                    .parameters
-                    .iter()
-                    .map(|x| x + size * random.normal())
-                    .collect();
+                let near: Vec<f64> = found.parameters.iter().map(|x| x + size * random.normal()).collect();
                 assert!(objective(&near) >= best - 1e-7 * best.abs().max(1.0));
             }
         }
@@ -382,11 +336,7 @@ mod tests {
         // Only the first body is seen.
         let unseen = case.map.columns(10, 10) * DVector::from_column_slice(&case.truth[10..]);
         for (row, y) in case.w.chunks_exact(14).zip(&mut case.y) {
-            *y -= row
-                .iter()
-                .zip(unseen.iter())
-                .map(|(w, p)| w * p)
-                .sum::<f64>();
+            *y -= row.iter().zip(unseen.iter()).map(|(w, p)| w * p).sum::<f64>();
         }
         case.regression = LeastSquares::new(14);
         case.regression.add_rows(&case.w, &case.y).unwrap();
@@ -398,56 +348,34 @@ mod tests {
         }
         assert!(found.from_recording[..10].iter().all(|share| *share > 0.5));
         // Fourteen combinations of ten numbers determine each of them.
-        assert_eq!(
-            found.individually_determined,
-            [[true; 10], [false; 10]].concat()
-        );
+        assert_eq!(found.individually_determined, [[true; 10], [false; 10]].concat());
     }
 
     /// Of `x + y` and `z` only the last is determined individually, whatever the nominal values are.
     #[test]
     fn what_is_told_in_sums_only_is_not_told_alone() {
-        let rows = DMatrix::from_row_slice(
-            3,
-            4,
-            &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0],
-        );
+        let rows = DMatrix::from_row_slice(3, 4, &[1e3, 1e3, 0.0, 0.0, 2e3, 2e3, 1e-3, 0.0, 0.0, 0.0, 1e-3, 0.0]);
         assert_eq!(individually_determined(&rows), [false, false, true, false]);
-        assert_eq!(
-            individually_determined(&DMatrix::zeros(2, 2)),
-            [false, false]
-        );
+        assert_eq!(individually_determined(&DMatrix::zeros(2, 2)), [false, false]);
         // Fourteen combinations of twenty numbers determine none of them.
         assert_eq!(find(&case(3, 0.05)).individually_determined, [false; 20]);
     }
 
     #[test]
     fn planar_bodies_need_inertia_about_their_centre() {
-        assert!(
-            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.51)
-                .cholesky()
-                .is_some()
-        );
-        assert!(
-            planar_pseudo_inertia(2.0, [0.6, 0.8], 0.49)
-                .cholesky()
-                .is_none()
-        );
+        assert!(planar_pseudo_inertia(2.0, [0.6, 0.8], 0.51).cholesky().is_some());
+        assert!(planar_pseudo_inertia(2.0, [0.6, 0.8], 0.49).cholesky().is_none());
         let body = BodyMatrix {
             name: "link".to_owned(),
             matrix: Box::new(|x: &[f64]| planar_pseudo_inertia(x[0], [x[1], 0.0], x[2])),
             copies: 2.0,
         };
-        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4])
-            .err()
-            .unwrap();
+        let error = NominalBodyMatrix::new(&body, &[2.0, 1.0, 0.4]).err().unwrap();
         assert!(
             error.to_string().contains("link") && error.to_string().contains("inertia"),
             "{error}"
         );
-        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4])
-            .err()
-            .unwrap();
+        let error = NominalBodyMatrix::new(&body, &[0.0, 0.0, 0.4]).err().unwrap();
         assert!(error.to_string().contains("mass"), "{error}");
     }
 }

@@ -95,10 +95,7 @@ pub fn solve_with_prior(
 }
 
 /// Ratio of the variances to those for independent residuals: the median over the parameters, at least 1.
-pub(crate) fn variance_inflation(
-    solution: &RegressionSolution,
-    deviations: &ParameterUncertainty,
-) -> f64 {
+pub(crate) fn variance_inflation(solution: &RegressionSolution, deviations: &ParameterUncertainty) -> f64 {
     let mut ratios: Vec<f64> = deviations
         .std
         .iter()
@@ -107,7 +104,5 @@ pub(crate) fn variance_inflation(
         .filter(|ratio| ratio.is_finite())
         .collect();
     ratios.sort_by(f64::total_cmp);
-    ratios
-        .get(ratios.len() / 2)
-        .map_or(1.0, |ratio| ratio.max(1.0))
+    ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.max(1.0))
 }

@@ -39,11 +39,7 @@ impl WithSimd for HouseholderFold<'_> {
     #[allow(clippy::inline_always, reason = "the trait's manual requires it")]
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let HouseholderBlock {
-            columns,
-            stride,
-            rows,
-        } = self.block;
+        let HouseholderBlock { columns, stride, rows } = self.block;
         let triangle = self.factor;
         let width = columns.len() / stride;
         for k in 0..width {
@@ -120,12 +116,7 @@ fn dots<S: Simd, const N: usize>(simd: S, pivot: &[f64], columns: [&[f64]; N]) -
 /// `column += factor * pivot` for `N` columns.
 #[allow(clippy::inline_always, reason = "part of the loop above")]
 #[inline(always)]
-fn add_scaled<S: Simd, const N: usize>(
-    simd: S,
-    factors: [f64; N],
-    pivot: &[f64],
-    columns: [&mut [f64]; N],
-) {
+fn add_scaled<S: Simd, const N: usize>(simd: S, factors: [f64; N], pivot: &[f64], columns: [&mut [f64]; N]) {
     let (pivot, _) = S::as_simd_f64s(pivot);
     let factors = factors.map(|factor| simd.splat_f64s(factor));
     let columns = columns.map(|column| &mut S::as_mut_simd_f64s(column).0[..pivot.len()]);

@@ -97,13 +97,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
         while !weighting.converged && weighting.iterations < options.iterations.max(2) {
             weighting.scales = residual_scales(&solution, &weighting, &mut show)?;
             let before = solution;
-            regression = reweight_rows(
-                &before.values,
-                channels,
-                &weighting,
-                WeightedRows::Weighted,
-                &mut show,
-            )?;
+            regression = reweight_rows(&before.values, channels, &weighting, WeightedRows::Weighted, &mut show)?;
             solution = regression.solve_near(nominal)?;
             weighting.iterations += 1;
             weighting.converged = (0..n).all(|j| {
@@ -129,14 +123,7 @@ pub fn estimate<E: From<LeastSquaresError>>(
     }
     let values = solution.values.clone();
     let deviations = uncertainty_with_autocorrelation(&solution, channels, |visit| {
-        show_weighted(
-            &values,
-            channels,
-            &weighting,
-            WeightedRows::Weighted,
-            &mut show,
-            visit,
-        )
+        show_weighted(&values, channels, &weighting, WeightedRows::Weighted, &mut show, visit)
     })?;
     Ok(WeightedEstimate {
         solution,
@@ -164,21 +151,14 @@ mod tests {
     }
 
     /// Two channels with errors of different size, correlated in time by `memory`; a share of `spoilt` is far off.
-    fn rows(
-        noise: &mut TestNoise,
-        samples: i32,
-        sizes: [f64; 2],
-        memory: f64,
-        spoilt: f64,
-    ) -> Rows {
+    fn rows(noise: &mut TestNoise, samples: i32, sizes: [f64; 2], memory: f64, spoilt: f64) -> Rows {
         let (mut w, mut y, mut state) = (Vec::new(), Vec::new(), [0.0; 2]);
         for i in 0..samples {
             for channel in 0..2 {
                 let t = 0.01 * f64::from(i) + 3.1 * channel as f64;
                 let row = [1.0, t.sin(), (1.3 * t).cos().signum()];
                 state[channel] = memory * state[channel] + sizes[channel] * noise.normal();
-                let mut value =
-                    row.iter().zip(TRUTH).map(|(w, p)| w * p).sum::<f64>() + state[channel];
+                let mut value = row.iter().zip(TRUTH).map(|(w, p)| w * p).sum::<f64>() + state[channel];
                 if noise.uniform() < spoilt {
                     value += 30.0 + 20.0 * noise.uniform();
                 }
@@ -190,18 +170,13 @@ mod tests {
     }
 
     fn run(rows: &Rows, options: &EstimateOptions) -> WeightedEstimate {
-        estimate(
-            &[0.0; 3],
-            2,
-            options,
-            |visit| -> Result<(), LeastSquaresError> {
-                // Odd blocks, as they come.
-                for (w, y) in rows.w.chunks(3 * 2 * 37).zip(rows.y.chunks(2 * 37)) {
-                    visit(w, y)?;
-                }
-                Ok(())
-            },
-        )
+        estimate(&[0.0; 3], 2, options, |visit| -> Result<(), LeastSquaresError> {
+            // Odd blocks, as they come.
+            for (w, y) in rows.w.chunks(3 * 2 * 37).zip(rows.y.chunks(2 * 37)) {
+                visit(w, y)?;
+            }
+            Ok(())
+        })
         .unwrap()
     }
 
@@ -272,12 +247,7 @@ mod tests {
             },
         ] {
             let (expected, found) = (run(&all, &options), run(&with_zeros, &options));
-            for (found, expected) in found
-                .weighting
-                .scales
-                .iter()
-                .zip(&expected.weighting.scales)
-            {
+            for (found, expected) in found.weighting.scales.iter().zip(&expected.weighting.scales) {
                 assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
             }
             assert!((found.weighting.outliers - expected.weighting.outliers).abs() < 1e-12);
@@ -330,10 +300,7 @@ mod tests {
                 *g += seen * w;
             }
         }
-        assert!(
-            gradient.iter().all(|g| g.abs() < 4000.0 * 1e-4),
-            "{gradient:?}"
-        );
+        assert!(gradient.iter().all(|g| g.abs() < 4000.0 * 1e-4), "{gradient:?}");
     }
 
     /// How often the true value is within two standard deviations, of 200.
@@ -345,9 +312,7 @@ mod tests {
             let found = run(&rows, options);
             // A constant force is what one-sided spoilt values look like; the others are free of that bias.
             inside += (1..3)
-                .filter(|j| {
-                    (found.solution.values[*j] - TRUTH[*j]).abs() <= 2.0 * found.uncertainty.std[*j]
-                })
+                .filter(|j| (found.solution.values[*j] - TRUTH[*j]).abs() <= 2.0 * found.uncertainty.std[*j])
                 .count();
         }
         f64::from(u32::try_from(inside).unwrap()) / 400.0
@@ -390,13 +355,11 @@ mod tests {
             &beliefs,
         )
         .unwrap();
-        let inflation =
-            crate::estimate::prior::variance_inflation(&found.solution, &found.uncertainty);
+        let inflation = crate::estimate::prior::variance_inflation(&found.solution, &found.uncertainty);
         let variance = found.solution.residual_variance() * inflation;
         let w = DMatrix::from_row_slice(800, 3, &rows.w);
         let y = DVector::from_column_slice(&rows.y);
-        let precision =
-            DMatrix::from_diagonal(&DVector::from_fn(3, |j, _| beliefs[j].std.powi(-2)));
+        let precision = DMatrix::from_diagonal(&DVector::from_fn(3, |j, _| beliefs[j].std.powi(-2)));
         let information = w.transpose() * &w / variance + &precision;
         let right = w.transpose() * y / variance + &precision * DVector::from_element(3, 0.5);
         let expected = information.clone().lu().solve(&right).unwrap();
@@ -413,10 +376,6 @@ mod tests {
         // What is believed firmly stays, what is not believed follows the recording.
         assert!((solution.values[0] - 0.5).abs() < 3.0);
         let apart = (solution.values[2] - found.solution.values[2]).abs();
-        assert!(
-            apart
-                < 3.0 * found.uncertainty.std[2]
-                    + (solution.values[0] - found.solution.values[0]).abs()
-        );
+        assert!(apart < 3.0 * found.uncertainty.std[2] + (solution.values[0] - found.solution.values[0]).abs());
     }
 }

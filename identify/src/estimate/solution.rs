@@ -107,29 +107,21 @@ pub(crate) fn solve_r_factor(
     let corner = triangle[n * width + n];
     let mut norms: Vec<f64> = r.column_iter().map(|column| column.norm()).collect();
     zero_noise_columns(&mut norms);
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        if norms[j] > 0.0 {
-            r[(i, j)] / norms[j]
-        } else {
-            0.0
-        }
-    });
+    let scaled = DMatrix::from_fn(n, n, |i, j| if norms[j] > 0.0 { r[(i, j)] / norms[j] } else { 0.0 });
     for norm in &mut norms {
         if *norm == 0.0 {
             *norm = 1.0;
         }
     }
     // The rank follows from the singular values of the scaled columns.
-    let svd = nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000)
-        .ok_or(LeastSquaresError::NoConvergence)?;
+    let svd =
+        nalgebra::SVD::try_new(scaled, true, true, f64::EPSILON, 10_000).ok_or(LeastSquaresError::NoConvergence)?;
     let (Some(u), Some(vt)) = (&svd.u, &svd.v_t) else {
         return Err(LeastSquaresError::NoConvergence);
     };
     let s = &svd.singular_values;
     let largest = s.max();
-    let kept: Vec<usize> = (0..n)
-        .filter(|&i| s[i] > RANK_TOLERANCE * largest)
-        .collect();
+    let kept: Vec<usize> = (0..n).filter(|&i| s[i] > RANK_TOLERANCE * largest).collect();
     let rank = kept.len();
     let r_inverse = if rank == n {
         // Back substitution keeps the small parameters accurate.
@@ -138,10 +130,7 @@ pub(crate) fn solve_r_factor(
             .ok_or(LeastSquaresError::NoConvergence)?
     } else {
         DMatrix::from_fn(n, n, |i, j| {
-            kept.iter()
-                .map(|&k| vt[(k, i)] * u[(j, k)] / s[k])
-                .sum::<f64>()
-                / norms[i]
+            kept.iter().map(|&k| vt[(k, i)] * u[(j, k)] / s[k]).sum::<f64>() / norms[i]
         })
     };
     let dropped: Vec<usize> = (0..n).filter(|i| !kept.contains(i)).collect();
@@ -151,8 +140,7 @@ pub(crate) fn solve_r_factor(
     let start = DVector::from_column_slice(nominal);
     let misfit = &qty - &r * &start;
     let values: DVector<f64> = if rank == n {
-        r.solve_upper_triangular(&qty)
-            .ok_or(LeastSquaresError::NoConvergence)?
+        r.solve_upper_triangular(&qty).ok_or(LeastSquaresError::NoConvergence)?
     } else {
         start + &r_inverse * &misfit
     };

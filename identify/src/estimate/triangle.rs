@@ -40,18 +40,12 @@ impl RFactor {
             });
         }
         if let Some(at) = entries.iter().position(|x| !x.is_finite()) {
-            return Err(LeastSquaresError::NotFinite {
-                row: at,
-                column: None,
-            });
+            return Err(LeastSquaresError::NotFinite { row: at, column: None });
         }
         let mut whole = vec![0.0; width * width];
         let mut next = entries.iter();
         for i in 0..width {
-            for (x, entry) in whole[i * width + i..(i + 1) * width]
-                .iter_mut()
-                .zip(next.by_ref())
-            {
+            for (x, entry) in whole[i * width + i..(i + 1) * width].iter_mut().zip(next.by_ref()) {
                 *x = *entry;
             }
         }
@@ -186,9 +180,7 @@ mod tests {
         let y: Vec<f64> = (0..rows).map(|_| noise.normal()).collect();
         let of = |from: usize, to: usize| {
             let mut regression = LeastSquares::new(n);
-            regression
-                .add_rows(&w[from * n..to * n], &y[from..to])
-                .unwrap();
+            regression.add_rows(&w[from * n..to * n], &y[from..to]).unwrap();
             let triangle = RFactor::new(&regression);
             RFactor::from_entries(n, triangle.rows(), &triangle.entries()).unwrap()
         };

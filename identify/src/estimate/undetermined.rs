@@ -43,10 +43,7 @@ impl NullDirection {
 ///
 /// `null_space` has one unit vector per row, in columns scaled by `norms`. Elimination with complete pivoting makes
 /// each direction start with a parameter that no other direction contains.
-pub(crate) fn null_directions(
-    null_space: &DMatrix<f64>,
-    norms: &[f64],
-) -> (Vec<bool>, Vec<NullDirection>) {
+pub(crate) fn null_directions(null_space: &DMatrix<f64>, norms: &[f64]) -> (Vec<bool>, Vec<NullDirection>) {
     let n = norms.len();
     let determined = (0..n)
         .map(|j| null_space.column(j).norm() <= PARTICIPATION_TOLERANCE)

@@ -145,32 +145,20 @@ pub(crate) fn show_weighted<E: From<LeastSquaresError>>(
             let scale = weighting.scales[at % channels];
             at += 1;
             let error = y - dot(row, values);
-            let inside = weighting
-                .huber
-                .is_none_or(|bound| error.abs() <= bound * scale);
+            let inside = weighting.huber.is_none_or(|bound| error.abs() <= bound * scale);
             // Weight min(1, bound / |residual|) beyond the bound; its root multiplies the row.
             let root = match (weighting.huber, rows) {
-                (Some(bound), WeightedRows::Weighted) if !inside => {
-                    (bound * scale / error.abs()).sqrt()
-                }
+                (Some(bound), WeightedRows::Weighted) if !inside => (bound * scale / error.abs()).sqrt(),
                 (Some(_), WeightedRows::Curvature) if !inside => 0.0,
                 _ => 1.0,
             };
-            let factor = if weighting.by_channel {
-                root / scale
-            } else {
-                root
-            };
+            let factor = if weighting.by_channel { root / scale } else { root };
             scaled.extend(row.iter().map(|w| factor * w));
             right.push(match (weighting.huber, rows) {
                 // The clipped residual keeps the variance of the gradient.
                 (Some(bound), WeightedRows::Curvature) => {
                     let seen = error.clamp(-bound * scale, bound * scale);
-                    let unit = if weighting.by_channel {
-                        seen / scale
-                    } else {
-                        seen
-                    };
+                    let unit = if weighting.by_channel { seen / scale } else { seen };
                     factor * dot(row, values) + unit
                 }
                 _ => factor * y,

@@ -53,9 +53,7 @@ fn shrink_to_coordinate_limits(
     most: f64,
 ) -> Vec<FourierSeries> {
     let pairs = series.iter().zip(measure.limits);
-    pairs
-        .map(|(one, limits)| fit_into_ranges(limits, one, most))
-        .collect()
+    pairs.map(|(one, limits)| fit_into_ranges(limits, one, most)).collect()
 }
 
 /// Shrinks all series by a common factor to the limits of the plant.
@@ -66,8 +64,7 @@ fn shrink_to_plant_limits(
     let fine = LIMIT_CHECK_REFINEMENT * super::samples_per_period(measure.options);
     let mut factor = 1.0_f64;
     for _ in 0..60 {
-        let trial: Vec<FourierSeries> =
-            kept.iter().map(|one| one.scale_amplitude(factor)).collect();
+        let trial: Vec<FourierSeries> = kept.iter().map(|one| one.scale_amplitude(factor)).collect();
         match worst_plant_limit(measure, &trial, fine) {
             Some((_, excess)) if excess <= -LIMIT_CLEARANCE => {
                 kept = trial;
@@ -94,10 +91,7 @@ fn fit_into_ranges(limits: &ExcitationLimits, series: &FourierSeries, most: f64)
     let by_position = (high - low) / (greatest - least).max(f64::MIN_POSITIVE);
     let factor = max_scale_factor(limits, series).min(by_position).min(most);
     let mut kept = series.scale_amplitude(factor);
-    let (below, above) = (
-        factor * (series.offset - least),
-        factor * (greatest - series.offset),
-    );
+    let (below, above) = (factor * (series.offset - least), factor * (greatest - series.offset));
     // Shift the mean only as far as needed.
     kept.offset = series.offset.max(low + below).min(high - above);
     kept
@@ -112,15 +106,8 @@ pub(super) fn worst_plant_limit(
 ) -> Option<(usize, f64)> {
     let motion = ExcitationMotion::sample(series, samples);
     let all = measure.plant.excess(&motion)?;
-    let peaks = all
-        .iter()
-        .map(|values| largest_between_samples(values))
-        .enumerate();
-    Some(
-        peaks
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .unwrap_or((usize::MAX, -1.0)),
-    )
+    let peaks = all.iter().map(|values| largest_between_samples(values)).enumerate();
+    Some(peaks.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((usize::MAX, -1.0)))
 }
 
 /// Upper estimate of a periodic function from its samples: the largest sample plus twice what a parabola through three
@@ -138,10 +125,7 @@ fn largest_between_samples(values: &[f64]) -> f64 {
 }
 
 /// Margins of a trajectory to all of its limits.
-pub(super) fn margins(
-    measure: &TrajectoryEvaluator<'_>,
-    series: &[FourierSeries],
-) -> Vec<LimitMargin> {
+pub(super) fn margins(measure: &TrajectoryEvaluator<'_>, series: &[FourierSeries]) -> Vec<LimitMargin> {
     let what = ["", "_d", "_dd"];
     let mut margins: Vec<LimitMargin> = measure
         .ranges()

@@ -111,9 +111,7 @@ fn upper_bound(terms: &[[f64; 2]]) -> f64 {
     let mut width = 2.0 * PI / pieces as f64;
     let ends: Vec<f64> = (0..=pieces).map(|i| value(i as f64 * width)).collect();
     let mut best = ends.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let mut open: Vec<(f64, f64, f64)> = (0..pieces)
-        .map(|i| (i as f64 * width, ends[i], ends[i + 1]))
-        .collect();
+    let mut open: Vec<(f64, f64, f64)> = (0..pieces).map(|i| (i as f64 * width, ends[i], ends[i + 1])).collect();
     while !open.is_empty() {
         let excess = curvature * width * width / 8.0;
         open.retain(|(_, left, right)| left.max(*right) + excess > best + tolerance);
@@ -169,11 +167,7 @@ mod tests {
         let step = 1e-5;
         for i in 0..20 {
             let t = 0.1 * f64::from(i);
-            let (before, now, after) = (
-                series.at_time(t - step),
-                series.at_time(t),
-                series.at_time(t + step),
-            );
+            let (before, now, after) = (series.at_time(t - step), series.at_time(t), series.at_time(t + step));
             for d in 0..2 {
                 let slope = (after[d] - before[d]) / (2.0 * step);
                 assert!((slope - now[d + 1]).abs() < 1e-6);

@@ -5,8 +5,8 @@ use std::cell::Cell;
 use nalgebra::DMatrix;
 
 use super::{
-    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries,
-    Options, samples_per_period,
+    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options,
+    samples_per_period,
 };
 
 /// A plant with limits and options; counts evaluations of the criterion.
@@ -22,11 +22,7 @@ pub(super) struct TrajectoryEvaluator<'a> {
 }
 
 impl<'a> TrajectoryEvaluator<'a> {
-    pub(super) fn new(
-        plant: &'a dyn ExcitationPlant,
-        limits: &'a [ExcitationLimits],
-        options: &'a Options,
-    ) -> Self {
+    pub(super) fn new(plant: &'a dyn ExcitationPlant, limits: &'a [ExcitationLimits], options: &'a Options) -> Self {
         Self {
             plant,
             limits,
@@ -74,9 +70,7 @@ impl<'a> TrajectoryEvaluator<'a> {
         let of_one = |(i, limits): (usize, &ExcitationLimits)| {
             let all = [Some(limits.position), limits.rate, limits.acceleration];
             let given = all.into_iter().enumerate();
-            given
-                .filter_map(|(d, range)| Some((i, d, range?)))
-                .collect::<Vec<_>>()
+            given.filter_map(|(d, range)| Some((i, d, range?))).collect::<Vec<_>>()
         };
         self.limits.iter().enumerate().flat_map(of_one).collect()
     }
@@ -123,11 +117,7 @@ pub fn least_singular_value(rows: &[Vec<f64>]) -> f64 {
         2 => {
             let (a, b, c) = (gram[(0, 0)], gram[(0, 1)], gram[(1, 1)]);
             let larger = 0.5 * (a + c + ((a - c).powi(2) + 4.0 * b * b).sqrt());
-            if larger > 0.0 {
-                (a * c - b * b) / larger
-            } else {
-                0.0
-            }
+            if larger > 0.0 { (a * c - b * b) / larger } else { 0.0 }
         }
         _ => gram.symmetric_eigenvalues().min(),
     };

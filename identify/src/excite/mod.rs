@@ -260,9 +260,7 @@ pub fn excite(
     let (value, series) = found.swap_remove(0);
     let condition = |series: &[FourierSeries]| {
         let motion = ExcitationMotion::sample(series, samples_per_period(options));
-        plant
-            .regressor(&motion)
-            .map_or(f64::INFINITY, |w| condition_number(&w))
+        plant.regressor(&motion).map_or(f64::INFINITY, |w| condition_number(&w))
     };
     Ok(ExcitationTrajectory {
         condition_number: condition(&series),

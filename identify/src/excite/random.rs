@@ -45,11 +45,7 @@ pub(super) fn draw_starts(
     drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
     // The search starts from these, so they must be within the limits between samples too. If the user stops, one is
     // enough.
-    drawn.truncate(if stopped {
-        1
-    } else {
-        4 * measure.options.starts.max(1)
-    });
+    drawn.truncate(if stopped { 1 } else { 4 * measure.options.starts.max(1) });
     let kept: Vec<(f64, Vec<FourierSeries>)> = drawn
         .into_iter()
         .filter_map(|(_, series)| super::feasible::shrink_to_limits(measure, &series))
@@ -113,11 +109,7 @@ pub(super) fn draw_feasible(
 }
 
 /// A random series of one coordinate that reaches its tightest limit, around a random mean within the remaining range.
-fn draw_series(
-    measure: &TrajectoryEvaluator<'_>,
-    i: usize,
-    draws: &mut RandomBits,
-) -> FourierSeries {
+fn draw_series(measure: &TrajectoryEvaluator<'_>, i: usize, draws: &mut RandomBits) -> FourierSeries {
     let n = measure.options.harmonics;
     let omega = measure.omega();
     let [low, high] = measure.limits[i].position;

@@ -83,10 +83,7 @@ fn optimise_round(
             }
             return 0.0;
         }
-        let is_known = known
-            .borrow()
-            .as_ref()
-            .is_some_and(|known| known.point == x);
+        let is_known = known.borrow().as_ref().is_some_and(|known| known.point == x);
         if !is_known {
             flow.set(progress(usize::from(k == 0)));
             *known.borrow_mut() = Some(linearise(measure, scales, x, sharpness));
@@ -100,9 +97,7 @@ fn optimise_round(
     };
     let n_constraints = objective_and_constraints(measure, scales, start, sharpness).len() - 1;
     let entry = &entry;
-    let constraint = |k: usize| {
-        move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient)
-    };
+    let constraint = |k: usize| move |x: &[f64], gradient: Option<&mut [f64]>, (): &mut ()| entry(x, k, gradient);
     let constraints: Vec<_> = (1..=n_constraints).map(constraint).collect();
     // Coefficients of size 1 reach a limit; four times that is far beyond.
     let bounds = vec![(-4.0, 4.0); start.len()];
@@ -171,11 +166,7 @@ fn objective_and_constraints(
 ) -> Vec<f64> {
     let motion = measure.sample_motion(&scales.decode(x));
     let value = measure.criterion_value(&motion);
-    let mut values = vec![if value.is_finite() {
-        value
-    } else {
-        INFEASIBLE_VALUE
-    }];
+    let mut values = vec![if value.is_finite() { value } else { INFEASIBLE_VALUE }];
     for (i, derivative, range) in measure.ranges() {
         let ExcitationMotion { q, qd, qdd } = &motion;
         let column = [q, qd, qdd][derivative];
@@ -185,9 +176,7 @@ fn objective_and_constraints(
     let n = measure.plant.limits().len();
     match measure.plant.excess(&motion) {
         Some(all) => {
-            let peaks = all
-                .iter()
-                .map(|one| smooth_largest(one.iter().copied(), sharpness));
+            let peaks = all.iter().map(|one| smooth_largest(one.iter().copied(), sharpness));
             values.extend(peaks);
         }
         None => values.extend(std::iter::repeat_n(INFEASIBLE_VALUE, n)),
@@ -222,12 +211,8 @@ impl<'m, 'a> CoefficientScales<'m, 'a> {
                 .map(|k| {
                     let w = k as f64 * measure.omega();
                     let by_rate = limits.rate.map_or(f64::INFINITY, |r| half_width(r) / w);
-                    let by_acceleration = limits
-                        .acceleration
-                        .map_or(f64::INFINITY, |r| half_width(r) / (w * w));
-                    half_width(limits.position)
-                        .min(by_rate)
-                        .min(by_acceleration)
+                    let by_acceleration = limits.acceleration.map_or(f64::INFINITY, |r| half_width(r) / (w * w));
+                    half_width(limits.position).min(by_rate).min(by_acceleration)
                 })
                 .collect()
         });

@@ -91,10 +91,7 @@ pub fn measure_separation(question: &SeparationProblem) -> Option<SeparationMeas
     }
     let base = orthonormal_basis(&question.base);
     let beyond = project_out(&base, &question.effect);
-    let spans = question
-        .rivals
-        .iter()
-        .map(|rival| orthonormal_extension(&base, rival));
+    let spans = question.rivals.iter().map(|rival| orthonormal_extension(&base, rival));
     let (rival, span, left) = spans
         .enumerate()
         .map(|(k, span)| {
@@ -129,9 +126,7 @@ pub fn fit_coefficients(base: &DMatrix<f64>, effect: &DMatrix<f64>, forces: &[f6
             effect.column(k - base.ncols())
         }
     };
-    let norms: Vec<f64> = (0..n)
-        .map(|k| column(k).norm().max(f64::MIN_POSITIVE))
-        .collect();
+    let norms: Vec<f64> = (0..n).map(|k| column(k).norm().max(f64::MIN_POSITIVE)).collect();
     let scaled = DMatrix::from_fn(base.nrows(), n, |i, k| column(k)[i] / norms[k]);
     let forces = nalgebra::DVector::from_column_slice(forces);
     let svd = scaled.svd(true, true);

@@ -86,11 +86,7 @@ impl FitFileError {
                 identify,
                 Remedy::option(OptionName::Out).with_value(file)
             ),
-            FitFault::NotAFit {
-                line,
-                column,
-                reason,
-            } => message!(
+            FitFault::NotAFit { line, column, reason } => message!(
                 "{file}, line {line}, column {column}: this is not the JSON that {} writes: \
                  {reason}",
                 identify
@@ -100,14 +96,8 @@ impl FitFileError {
                 identify,
                 Remedy::option(OptionName::Data)
             ),
-            FitFault::MissingParameter {
-                name,
-                nearest,
-                present,
-            } => {
-                let nearest = nearest
-                    .as_ref()
-                    .map(|near| format!(" (the closest is `{near}`)"));
+            FitFault::MissingParameter { name, nearest, present } => {
+                let nearest = nearest.as_ref().map(|near| format!(" (the closest is `{near}`)"));
                 message!(
                     "{file}: the model's parameter `{name}` is not in the fit{}, which has {}; identify this model again",
                     nearest.unwrap_or_default(),

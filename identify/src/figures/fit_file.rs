@@ -46,10 +46,7 @@ pub enum ParameterStatus {
 }
 
 impl ParameterStatus {
-    #[allow(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde passes a reference"
-    )]
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
     /// Whether it is the default, which is omitted in JSON.
     fn is_identified(&self) -> bool {
         *self == Self::Identified
@@ -112,11 +109,7 @@ pub struct FitFile {
     /// Error figures on the validation runs, if any.
     pub check: Option<ErrorFigures>,
     /// Notes on the data.
-    #[serde(
-        default,
-        skip_serializing_if = "Vec::is_empty",
-        with = "crate::recording::notes"
-    )]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "crate::recording::notes")]
     pub data: Vec<RecordingNote>,
     /// Further results of the estimator, of which only physical parameters are read again.
     #[serde(default, skip_serializing)]
@@ -152,16 +145,8 @@ pub fn fit_parameters(
     solution: &RegressionSolution,
     deviations: &ParameterUncertainty,
 ) -> Vec<FitParameter> {
-    assert_eq!(
-        infos.len(),
-        solution.values.len(),
-        "one description per column"
-    );
-    assert_eq!(
-        infos.len(),
-        deviations.std.len(),
-        "one standard deviation per column"
-    );
+    assert_eq!(infos.len(), solution.values.len(), "one description per column");
+    assert_eq!(infos.len(), deviations.std.len(), "one standard deviation per column");
     let finite = |value: f64| value.is_finite().then_some(value);
     infos
         .iter()
@@ -187,11 +172,7 @@ pub fn fit_parameters(
 impl FitFile {
     /// Physically possible parameters as (name, value); none unless they were requested.
     pub fn physical_parameters(&self) -> Vec<(String, f64)> {
-        let found = self
-            .estimator
-            .physical
-            .iter()
-            .flat_map(|found| &found.parameters);
+        let found = self.estimator.physical.iter().flat_map(|found| &found.parameters);
         found.map(|one| (one.name.clone(), one.value)).collect()
     }
 
@@ -200,10 +181,7 @@ impl FitFile {
     /// the file's covariance.
     pub fn covariance_of(&self, parameters: &[usize]) -> Option<(DMatrix<f64>, bool)> {
         let n = parameters.len();
-        let std: Option<Vec<f64>> = parameters
-            .iter()
-            .map(|k| self.parameters.get(*k)?.std)
-            .collect();
+        let std: Option<Vec<f64>> = parameters.iter().map(|k| self.parameters.get(*k)?.std).collect();
         let std = std?;
         let whole = self.covariance.as_ref().filter(|rows| {
             let m = self.parameters.len();
@@ -230,14 +208,12 @@ impl FitFile {
     /// Reads a fit as [`FitFile::read`] does, from `files`.
     pub fn read_from(files: &dyn FileSource, path: &Path) -> Result<Self, FitFileError> {
         let file = path.display().to_string();
-        let text = files
-            .read_text(path, LONGEST_FIT)
-            .map_err(|error| FitFileError {
-                file: file.clone(),
-                fault: FitFault::Unreadable {
-                    reason: error.fault.to_string(),
-                },
-            })?;
+        let text = files.read_text(path, LONGEST_FIT).map_err(|error| FitFileError {
+            file: file.clone(),
+            fault: FitFault::Unreadable {
+                reason: error.fault.to_string(),
+            },
+        })?;
         Self::parse(&text, &file)
     }
 
@@ -281,11 +257,7 @@ impl FitFile {
             if (then - now).abs() <= 1e-12 * then.abs().max(now.abs()) {
                 continue;
             }
-            if self
-                .parameters
-                .iter()
-                .any(|p| contains_name(&p.expression, name))
-            {
+            if self.parameters.iter().any(|p| contains_name(&p.expression, name)) {
                 return Err(FitFileError {
                     file: file.to_owned(),
                     fault: FitFault::ConstantDiffers {
@@ -308,10 +280,7 @@ impl FitFile {
             fault,
         };
         for (i, parameter) in self.parameters.iter().enumerate() {
-            if self.parameters[..i]
-                .iter()
-                .any(|other| other.name == parameter.name)
-            {
+            if self.parameters[..i].iter().any(|other| other.name == parameter.name) {
                 return Err(fail(FitFault::DuplicateParameter {
                     name: parameter.name.clone(),
                 }));
@@ -319,16 +288,11 @@ impl FitFile {
         }
         let mut values = Vec::with_capacity(model.len());
         for (name, expression) in model {
-            let Some(parameter) = self
-                .parameters
-                .iter()
-                .find(|parameter| parameter.name == *name)
-            else {
+            let Some(parameter) = self.parameters.iter().find(|parameter| parameter.name == *name) else {
                 let present: Vec<String> = self.parameters.iter().map(|p| p.name.clone()).collect();
                 return Err(fail(FitFault::MissingParameter {
                     name: (*name).to_owned(),
-                    nearest: nearest_name(name, present.iter().map(String::as_str))
-                        .map(str::to_owned),
+                    nearest: nearest_name(name, present.iter().map(String::as_str)).map(str::to_owned),
                     present,
                 }));
             };
@@ -378,8 +342,7 @@ mod tests {
     #[test]
     fn a_fit_survives_writing_and_reading() {
         let fit = FitFile::parse(TEXT, "fit.json").unwrap();
-        let again =
-            FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
+        let again = FitFile::parse(&serde_json::to_string_pretty(&fit).unwrap(), "fit.json").unwrap();
         assert_eq!(fit, again);
         assert_eq!(
             fit.values_for(&[("p2_min", "fv"), ("p1_min", "m")], "fit.json")
@@ -404,32 +367,22 @@ mod tests {
             Ok(vec![("g".to_owned(), 9.81, 9.80)])
         );
         let says = others(&[("L", 0.6)]).unwrap_err().to_string();
-        assert!(
-            says.contains("L = 0.5") && says.contains("L = 0.6"),
-            "{says}"
-        );
+        assert!(says.contains("L = 0.5") && says.contains("L = 0.6"), "{says}");
         let earlier = FitFile::parse(TEXT, "fit.json").unwrap();
-        assert_eq!(
-            earlier.differing_constants(&[("m", 1.0)], "fit.json"),
-            Ok(vec![])
-        );
+        assert_eq!(earlier.differing_constants(&[("m", 1.0)], "fit.json"), Ok(vec![]));
     }
 
     #[test]
     fn a_fit_of_another_model_is_refused_with_the_reason() {
         let fit = FitFile::parse(TEXT, "fit.json").unwrap();
-        let says =
-            |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
+        let says = |model: &[(&str, &str)]| fit.values_for(model, "fit.json").unwrap_err().to_string();
         assert_eq!(
             says(&[("p1_min", "m"), ("p3_min", "fc"), ("p2_min", "fv")]),
             "fit.json: the model's parameter `p3_min` is not in the fit (the closest is `p1_min`), \
              which has `p1_min`, `p2_min`; identify this model again"
         );
         assert!(says(&[("p1_min", "m")]).contains("has `p2_min`, which the model does not have"));
-        assert!(
-            says(&[("p1_min", "m + d"), ("p2_min", "fv")])
-                .contains("`m` in the fit but `m + d` in the model")
-        );
+        assert!(says(&[("p1_min", "m + d"), ("p2_min", "fv")]).contains("`m` in the fit but `m + d` in the model"));
         let broken = FitFile::parse(&TEXT.replace("\"fit\"", "\"fits\""), "fit.json")
             .unwrap_err()
             .to_string();

@@ -9,9 +9,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::thresholds::{
-    BIN_FEWEST_SAMPLES, DENSE_PARTS_LEAST_SHARE, FEWEST_PARTS, MOST_REGIONS, PART_DENSITY_SHARE,
-    PART_FEWEST_SAMPLES, RECURRENCE_PARTS, REGION_LEAST_DENSITY, REGION_LEAST_EXCESS,
-    ZERO_REGION_LEAST_SHARE,
+    BIN_FEWEST_SAMPLES, DENSE_PARTS_LEAST_SHARE, FEWEST_PARTS, MOST_REGIONS, PART_DENSITY_SHARE, PART_FEWEST_SAMPLES,
+    RECURRENCE_PARTS, REGION_LEAST_DENSITY, REGION_LEAST_EXCESS, ZERO_REGION_LEAST_SHARE,
 };
 use crate::words::with_digits;
 
@@ -79,10 +78,7 @@ pub fn locate_errors(
 ) -> Vec<ErrorRegion> {
     let mut regions = Vec::new();
     for (channel, error) in errors {
-        let squares: Vec<f64> = error
-            .iter()
-            .map(|e| if e.is_finite() { e * e } else { 0.0 })
-            .collect();
+        let squares: Vec<f64> = error.iter().map(|e| if e.is_finite() { e * e } else { 0.0 }).collect();
         let total: f64 = squares.iter().sum();
         if total <= 0.0 || !total.is_finite() {
             continue;
@@ -90,9 +86,7 @@ pub fn locate_errors(
         let mut found: Vec<ErrorRegion> = variables
             .iter()
             .filter(|(_, values)| values.len() == error.len())
-            .filter_map(|(name, values)| {
-                densest_region(channel, &squares, total, name, values, options)
-            })
+            .filter_map(|(name, values)| densest_region(channel, &squares, total, name, values, options))
             .collect();
         found.sort_by(|a, b| (b.share - b.samples).total_cmp(&(a.share - a.samples)));
         found.truncate(options.most);
@@ -110,9 +104,7 @@ fn densest_region(
     values: &[f64],
     options: &LocateOptions,
 ) -> Option<ErrorRegion> {
-    let mut order: Vec<usize> = (0..values.len())
-        .filter(|&i| values[i].is_finite())
-        .collect();
+    let mut order: Vec<usize> = (0..values.len()).filter(|&i| values[i].is_finite()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let n = order.len();
     let bins = options.bins.min(n / BIN_FEWEST_SAMPLES);
@@ -197,11 +189,7 @@ fn best_interval(order: &[usize], squares: &[f64], total: f64, edges: &[usize]) 
     let mut best = (f64::NEG_INFINITY, 0, order.len());
     let (mut sum, mut start) = (0.0, 0);
     for bin in edges.windows(2) {
-        let share: f64 = order[bin[0]..bin[1]]
-            .iter()
-            .map(|&i| squares[i])
-            .sum::<f64>()
-            / total;
+        let share: f64 = order[bin[0]..bin[1]].iter().map(|&i| squares[i]).sum::<f64>() / total;
         if sum <= 0.0 {
             (sum, start) = (0.0, bin[0]);
         }
@@ -232,8 +220,7 @@ fn is_recurrent(squares: &[f64], values: &[f64], range: [f64; 2], density: f64) 
         let share = inside.iter().sum::<f64>() / total;
         // In a single part of the recording, less than the required density is enough.
         let enough = 1.0 + PART_DENSITY_SHARE * (density - 1.0);
-        dense +=
-            usize::from(share >= (enough * inside.len() as f64 / squares.len() as f64).min(1.0));
+        dense += usize::from(share >= (enough * inside.len() as f64 / squares.len() as f64).min(1.0));
     }
     visited >= FEWEST_PARTS && dense as f64 >= DENSE_PARTS_LEAST_SHARE * visited as f64
 }
@@ -245,10 +232,7 @@ mod tests {
 
     fn motion(samples: u32) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let time: Vec<f64> = (0..samples).map(|i| 0.004 * f64::from(i)).collect();
-        let angle = time
-            .iter()
-            .map(|t| (1.3 * t).sin() + 0.4 * (3.1 * t).cos())
-            .collect();
+        let angle = time.iter().map(|t| (1.3 * t).sin() + 0.4 * (3.1 * t).cos()).collect();
         let rate = time
             .iter()
             .map(|t| 1.3 * (1.3 * t).cos() - 1.24 * (3.1 * t).sin())
@@ -262,14 +246,7 @@ mod tests {
         let mut noise = TestNoise::new(9);
         let error: Vec<f64> = rate
             .iter()
-            .map(|v| {
-                noise.normal()
-                    + if v.abs() < 0.1 {
-                        12.0 * v.signum()
-                    } else {
-                        0.0
-                    }
-            })
+            .map(|v| noise.normal() + if v.abs() < 0.1 { 12.0 * v.signum() } else { 0.0 })
             .collect();
         let regions = locate_errors(
             &[("left", &error)],
@@ -277,10 +254,7 @@ mod tests {
             &LocateOptions::default(),
         );
         let first = &regions[0];
-        assert_eq!(
-            (first.channel.as_str(), first.variable.as_str()),
-            ("left", "q_d")
-        );
+        assert_eq!((first.channel.as_str(), first.variable.as_str()), ("left", "q_d"));
         assert!(
             first.range[0] < 0.0 && first.range[1] < 0.25 && first.share > 0.6,
             "{first:?}"
@@ -324,14 +298,7 @@ mod tests {
         assert!(locate_errors(&[("a", &[])], &[("q", &[])], &options).is_empty());
         assert!(locate_errors(&[("a", &[0.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
         assert!(locate_errors(&[("a", &[1.0; 100])], &[("q", &[1.0; 100])], &options).is_empty());
-        assert!(
-            locate_errors(
-                &[("a", &[f64::NAN; 100])],
-                &[("q", &[f64::NAN; 100])],
-                &options
-            )
-            .is_empty()
-        );
+        assert!(locate_errors(&[("a", &[f64::NAN; 100])], &[("q", &[f64::NAN; 100])], &options).is_empty());
         assert!(locate_errors(&[("a", &[1.0; 100])], &[("q", &[1.0; 99])], &options).is_empty());
     }
 }

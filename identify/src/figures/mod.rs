@@ -21,9 +21,7 @@ use serde::{Deserialize, Serialize};
 
 pub use filtered::{BandError, FilteredChannelFigures, FilteredFigures, add_filtered_forces};
 pub use fit_error::{FitFault, FitFileError};
-pub use fit_file::{
-    EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters,
-};
+pub use fit_file::{EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, fit_parameters};
 pub use locate::{ErrorRegion, LocateOptions, TIME_COLUMN, locate_errors};
 pub use thresholds::TRIMMED_PART;
 
@@ -191,10 +189,7 @@ impl ErrorAccumulator {
         counts: impl Fn(usize, usize) -> bool,
     ) -> Result<(), FiguresError> {
         let channels = self.channels.len();
-        if channels == 0
-            || measured.len() != model.len()
-            || !measured.len().is_multiple_of(channels)
-        {
+        if channels == 0 || measured.len() != model.len() || !measured.len().is_multiple_of(channels) {
             return Err(FiguresError::Shape {
                 measured: measured.len(),
                 model: model.len(),
@@ -243,9 +238,7 @@ impl ErrorAccumulator {
         let counted = |sums: &ChannelErrorSums| self.samples - sums.not_counted;
         let all: usize = self.channels.values().map(counted).sum();
         let mut units = self.channels.values().map(|sums| &sums.unit);
-        let is_one_unit = units
-            .next()
-            .is_some_and(|first| units.all(|unit| unit == first));
+        let is_one_unit = units.next().is_some_and(|first| units.all(|unit| unit == first));
         let channels = self.channels.iter().map(|(name, sums)| {
             let samples = counted(sums);
             let counted = samples - sums.zero_measured;
@@ -285,9 +278,8 @@ pub fn compare_forces(
     model: &[Vec<f64>],
 ) -> Result<ErrorFigures, FiguresError> {
     let samples = measured.first().map_or(0, Vec::len);
-    let fits = |columns: &[Vec<f64>]| {
-        columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples)
-    };
+    let fits =
+        |columns: &[Vec<f64>]| columns.len() == channels.len() && columns.iter().all(|column| column.len() == samples);
     if !fits(measured) || !fits(model) {
         let count = |columns: &[Vec<f64>]| columns.iter().map(Vec::len).sum();
         return Err(FiguresError::Shape {
@@ -322,30 +314,20 @@ mod tests {
         assert!((a.nrms.unwrap() - (1.25_f64 / 9.0).sqrt()).abs() < 1e-15);
         assert!((a.mean_relative.unwrap() - 0.5 / 3.0).abs() < 1e-15);
         assert!((a.abs_ratio.unwrap() - 1.5 / 5.0).abs() < 1e-15);
-        assert_eq!(
-            (a.max_abs.to_bits(), a.zero_measured),
-            (1.0_f64.to_bits(), 1)
-        );
+        assert_eq!((a.max_abs.to_bits(), a.zero_measured), (1.0_f64.to_bits(), 1));
         assert!((figures.nrms.unwrap() - (2.25_f64 / 25.0).sqrt()).abs() < 1e-15);
         assert!((figures.rms.unwrap() - (2.25_f64 / 8.0).sqrt()).abs() < 1e-15);
         let json = serde_json::to_value(&figures).unwrap();
         assert!(json["channels"]["b"]["mean_relative"].is_number());
-        assert_eq!(
-            serde_json::from_value::<ErrorFigures>(json).unwrap(),
-            figures
-        );
+        assert_eq!(serde_json::from_value::<ErrorFigures>(json).unwrap(), figures);
     }
 
     /// Squares of newtons and of newton metres have no sum.
     #[test]
     fn different_units_have_no_total_and_some_samples_do_not_count() {
         let names = ["a".to_owned(), "b".to_owned()];
-        let mut comparison =
-            ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
-        let (measured, model) = (
-            [3.0, 1.0, 9e9, 1.0, 4.0, 1.0],
-            [3.0, 1.5, 0.0, 1.0, 5.0, 1.0],
-        );
+        let mut comparison = ErrorAccumulator::new(names).with_units(["N".to_owned(), "N m".to_owned()]);
+        let (measured, model) = ([3.0, 1.0, 9e9, 1.0, 4.0, 1.0], [3.0, 1.5, 0.0, 1.0, 5.0, 1.0]);
         let counts = |sample, channel| (sample, channel) != (1, 0);
         comparison.add_counted(&measured, &model, counts).unwrap();
         let figures = comparison.finish().unwrap();
@@ -359,10 +341,7 @@ mod tests {
     fn nothing_measured_gives_no_ratio_and_bad_values_are_refused() {
         let names = ["a".to_owned()];
         let silent = compare_forces(&names, &[vec![0.0, 0.0]], &[vec![1.0, 0.0]]).unwrap();
-        assert_eq!(
-            (silent.nrms, silent.channels["a"].mean_relative),
-            (None, None)
-        );
+        assert_eq!((silent.nrms, silent.channels["a"].mean_relative), (None, None));
         let error = compare_forces(&names, &[vec![0.0, 1.0]], &[vec![0.0, f64::NAN]]).unwrap_err();
         assert_eq!(
             error,

@@ -121,11 +121,7 @@ impl std::error::Error for InterpretError {}
 /// ```
 pub fn interpret(system: &InterpretationProblem) -> Result<PhysicalInterpretation, InterpretError> {
     let n = system.nominal.len();
-    assert_eq!(
-        system.equations.len(),
-        system.values.len(),
-        "one value per equation"
-    );
+    assert_eq!(system.equations.len(), system.values.len(), "one value per equation");
     assert!(
         system.equations.iter().all(|p| p.n == n),
         "one nominal value per unknown"
@@ -134,9 +130,7 @@ pub fn interpret(system: &InterpretationProblem) -> Result<PhysicalInterpretatio
     let used: Vec<usize> = (0..system.equations.len())
         .filter(|k| (0..n).any(|i| system.equations[*k].has_unknown(i)))
         .collect();
-    let jacobian = |k: &usize| -> Vec<Polynomial> {
-        (0..n).map(|i| system.equations[*k].derivative(i)).collect()
-    };
+    let jacobian = |k: &usize| -> Vec<Polynomial> { (0..n).map(|i| system.equations[*k].derivative(i)).collect() };
     let jacobian: Vec<Vec<Polynomial>> = used.iter().map(jacobian).collect();
     // The rank of the Jacobian decides between undetermined, exact and least squares.
     let rank = generic_rank(&jacobian, n);
@@ -193,11 +187,7 @@ fn jacobian_at(system: &InterpretationProblem, equations: &[usize], at: &[f64]) 
 }
 
 /// Standard deviations of a solution of as many equations as unknowns: `J x' = p'` gives `cov x = J^-1 cov p J^-T`.
-fn standard_deviations(
-    system: &InterpretationProblem,
-    used: &[usize],
-    at: &[f64],
-) -> Option<Vec<f64>> {
+fn standard_deviations(system: &InterpretationProblem, used: &[usize], at: &[f64]) -> Option<Vec<f64>> {
     let covariance = system.covariance.as_ref()?;
     let mut jacobian = jacobian_at(system, used, at);
     // Scale rows and columns, so that units do not decide whether the matrix is singular.
@@ -218,12 +208,8 @@ fn standard_deviations(
     }
     // Undo the scaling.
     let inverse = jacobian.try_inverse()?;
-    let inverse = DMatrix::from_fn(at.len(), used.len(), |i, r| {
-        inverse[(i, r)] / (columns[i] * scales[r])
-    });
-    let part = DMatrix::from_fn(used.len(), used.len(), |a, b| {
-        covariance[(used[a], used[b])]
-    });
+    let inverse = DMatrix::from_fn(at.len(), used.len(), |i, r| inverse[(i, r)] / (columns[i] * scales[r]));
+    let part = DMatrix::from_fn(used.len(), used.len(), |a, b| covariance[(used[a], used[b])]);
     let result = &inverse * part * inverse.transpose();
     Some(roots_of_diagonal(&result))
 }
@@ -324,19 +310,12 @@ fn find_undetermined(
     let null_space = DMatrix::from_fn(n_null, n, |r, i| v_t[(order[r], i)]);
     let norms: Vec<f64> = scales.iter().map(|s| 1.0 / s.abs()).collect();
     let (determined, directions) = null_directions(&null_space, &norms);
-    PhysicalInterpretation::Undetermined {
-        directions,
-        determined,
-    }
+    PhysicalInterpretation::Undetermined { directions, determined }
 }
 
 /// Matrix that whitens the equations: `L^-1` of the covariance's Cholesky factor, or one over the values if there is no
 /// usable covariance. The flag states which.
-fn whiten_rows(
-    covariance: Option<&DMatrix<f64>>,
-    used: &[usize],
-    values: &[f64],
-) -> (DMatrix<f64>, bool) {
+fn whiten_rows(covariance: Option<&DMatrix<f64>>, used: &[usize], values: &[f64]) -> (DMatrix<f64>, bool) {
     let n = used.len();
     let part = covariance.map(|c| DMatrix::from_fn(n, n, |a, b| c[(used[a], used[b])]));
     let factor = part
@@ -356,10 +335,7 @@ fn whiten_rows(
                     *w
                 }
             });
-            (
-                DMatrix::from_diagonal(&DVector::from_iterator(n, weights)),
-                false,
-            )
+            (DMatrix::from_diagonal(&DVector::from_iterator(n, weights)), false)
         }
     }
 }

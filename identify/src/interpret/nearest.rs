@@ -7,12 +7,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::roots::{RealSolutions, solve};
-use super::thresholds::{
-    MINIMUM_MOST_GRADIENT, SAME_MINIMUM_NOMINAL_PART, SAME_MINIMUM_PART, SOLUTION_MOST_ERROR,
-};
+use super::thresholds::{MINIMUM_MOST_GRADIENT, SAME_MINIMUM_NOMINAL_PART, SAME_MINIMUM_PART, SOLUTION_MOST_ERROR};
 use super::{
-    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, equation, jacobian_at,
-    residuals, roots_of_diagonal, whiten_rows,
+    InterpretationProblem, PhysicalInterpretation, PhysicalSolution, equation, jacobian_at, residuals,
+    roots_of_diagonal, whiten_rows,
 };
 use modelmill_algebra::polynomial::Polynomial;
 
@@ -22,10 +20,7 @@ const MOST_SUBSETS: usize = 40;
 const MOST_STEPS: usize = 500;
 
 /// Least squares solutions; `used` are the equations that contain unknowns.
-pub(crate) fn solve_least_squares(
-    system: &InterpretationProblem,
-    used: &[usize],
-) -> PhysicalInterpretation {
+pub(crate) fn solve_least_squares(system: &InterpretationProblem, used: &[usize]) -> PhysicalInterpretation {
     let n = system.nominal.len();
     let (weights, is_weighted) = whiten_rows(system.covariance.as_ref(), used, &system.values);
     // Linear equations have one minimum, so one starting point is enough.
@@ -49,9 +44,7 @@ pub(crate) fn solve_least_squares(
         let is_known = solutions.iter().any(|known| {
             let pairs = known.values.iter().zip(&values);
             pairs.zip(&system.nominal).all(|((a, b), x0)| {
-                (a - b).abs()
-                    <= SAME_MINIMUM_PART
-                        * (a.abs() + b.abs() + SAME_MINIMUM_NOMINAL_PART * x0.abs())
+                (a - b).abs() <= SAME_MINIMUM_PART * (a.abs() + b.abs() + SAME_MINIMUM_NOMINAL_PART * x0.abs())
             })
         });
         if !is_known {
@@ -86,9 +79,7 @@ fn descend(
     let n = start.len();
     // Whitened residuals at a point.
     let errors = |x: &[f64]| {
-        let e = used
-            .iter()
-            .map(|k| system.values[*k] - system.equations[*k].value(x));
+        let e = used.iter().map(|k| system.values[*k] - system.equations[*k].value(x));
         weights * DVector::from_iterator(used.len(), e)
     };
     let mut x = start.to_vec();

@@ -14,8 +14,7 @@ use modelmill_algebra::groebner::{
 };
 use modelmill_algebra::polynomial::{Polynomial, TermExponents, nearest_f64, unknown_polynomial};
 use modelmill_algebra::real_roots::{
-    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots,
-    squarefree_part,
+    RationalInterval, UnivariatePolynomial, halve_interval, is_squarefree, isolate_roots, squarefree_part,
 };
 
 /// Largest number of complex solutions of a system.
@@ -35,10 +34,7 @@ pub(crate) enum RealSolutions {
 }
 
 /// Solves equations `polynomial = 0` in `n` unknowns; an error if the computation is too large.
-pub(crate) fn solve(
-    equations: &[Polynomial],
-    n: usize,
-) -> Result<RealSolutions, GroebnerLimitExceeded> {
+pub(crate) fn solve(equations: &[Polynomial], n: usize) -> Result<RealSolutions, GroebnerLimitExceeded> {
     let mut work = GroebnerWork::default();
     let mut basis = groebner_basis(equations, &mut work)?;
     let mut is_radical = false;
@@ -137,8 +133,7 @@ impl QuotientRing<'_> {
         // The first power that is a combination of lower ones gives the polynomial.
         for k in 1..powers.len() {
             if let Some(mut factors) = solve_combinations(&powers[..k], &[&powers[k]]) {
-                let mut minimal: UnivariatePolynomial =
-                    factors.remove(0).into_iter().map(|f| -f).collect();
+                let mut minimal: UnivariatePolynomial = factors.remove(0).into_iter().map(|f| -f).collect();
                 minimal.push(BigRational::one());
                 return Ok(minimal);
             }
@@ -157,10 +152,7 @@ impl QuotientRing<'_> {
         // Integer weights of the unknowns, different for each k.
         let mut weight = 1_i64;
         for i in 0..n {
-            form.add(
-                TermExponents::unknown(n, i),
-                &BigRational::from_integer(weight.into()),
-            );
+            form.add(TermExponents::unknown(n, i), &BigRational::from_integer(weight.into()));
             weight = (weight * (k + 1) + k) % 1009;
         }
         let mut powers = self.powers(&form, work)?;
@@ -219,10 +211,7 @@ impl ShapeLemmaSolution {
 
 /// Each target as a combination of vectors, by Gauss-Jordan elimination. `None` unless the vectors are independent and
 /// span all targets.
-fn solve_combinations(
-    vectors: &[Vec<BigRational>],
-    targets: &[&Vec<BigRational>],
-) -> Option<Vec<Vec<BigRational>>> {
+fn solve_combinations(vectors: &[Vec<BigRational>], targets: &[&Vec<BigRational>]) -> Option<Vec<Vec<BigRational>>> {
     let (rows, columns) = (vectors[0].len(), vectors.len());
     let mut matrix: Vec<Vec<BigRational>> = (0..rows)
         .map(|r| {
@@ -254,11 +243,7 @@ fn solve_combinations(
         .all(|row| row[columns..].iter().all(Zero::is_zero));
     spans.then(|| {
         (0..targets.len())
-            .map(|t| {
-                (0..columns)
-                    .map(|c| matrix[c][columns + t].clone())
-                    .collect()
-            })
+            .map(|t| (0..columns).map(|c| matrix[c][columns + t].clone()).collect())
             .collect()
     })
 }
@@ -319,17 +304,8 @@ mod tests {
         // x^2 + 1 = 0 has no real solution; x = 1 and x = 2 contradict each other; x y = 1 is a curve.
         let complex = system(1, &[&[(1.0, &[(0, 2)]), (1.0, &[])]]);
         assert_eq!(sorted(solve(&complex, 1).unwrap()), Vec::<Vec<f64>>::new());
-        let contradiction = system(
-            1,
-            &[
-                &[(1.0, &[(0, 1)]), (-1.0, &[])],
-                &[(1.0, &[(0, 1)]), (-2.0, &[])],
-            ],
-        );
-        assert_eq!(
-            sorted(solve(&contradiction, 1).unwrap()),
-            Vec::<Vec<f64>>::new()
-        );
+        let contradiction = system(1, &[&[(1.0, &[(0, 1)]), (-1.0, &[])], &[(1.0, &[(0, 1)]), (-2.0, &[])]]);
+        assert_eq!(sorted(solve(&contradiction, 1).unwrap()), Vec::<Vec<f64>>::new());
         let curve = system(2, &[&[(1.0, &[(0, 1), (1, 1)]), (-1.0, &[])]]);
         assert_eq!(solve(&curve, 2).unwrap(), RealSolutions::Infinite);
     }

@@ -5,12 +5,7 @@ use super::*;
 type Equations<'a> = &'a [&'a [(f64, &'a [(usize, u32)])]];
 
 /// A problem with `n` unknowns, equal standard deviations, and nominal values of 1.
-fn system(
-    n: usize,
-    equations: Equations<'_>,
-    values: &[f64],
-    std: Option<f64>,
-) -> InterpretationProblem {
+fn system(n: usize, equations: Equations<'_>, values: &[f64], std: Option<f64>) -> InterpretationProblem {
     let polynomial = |terms: &&[(f64, &[(usize, u32)])]| {
         let mut p = Polynomial::new(n);
         for (factor, powers) in *terms {
@@ -32,10 +27,7 @@ fn both_solutions_of_a_quadratic_are_found_with_their_deviations() {
     // x y = 6, x + y = 5: (2, 3) and (3, 2). J = [y x; 1 1], inverse 1/(y - x) [1 -x; -1 y].
     let found = interpret(&system(
         2,
-        &[
-            &[(1.0, &[(0, 1), (1, 1)])],
-            &[(1.0, &[(0, 1)]), (1.0, &[(1, 1)])],
-        ],
+        &[&[(1.0, &[(0, 1), (1, 1)])], &[(1.0, &[(0, 1)]), (1.0, &[(1, 1)])]],
         &[6.0, 5.0],
         Some(0.1),
     ))
@@ -83,11 +75,7 @@ fn what_is_not_determined_is_named() {
         None,
     ))
     .unwrap();
-    let PhysicalInterpretation::Undetermined {
-        directions,
-        determined,
-    } = found
-    else {
+    let PhysicalInterpretation::Undetermined { directions, determined } = found else {
         panic!("{found:?}")
     };
     assert_eq!(determined, [false, false, true]);

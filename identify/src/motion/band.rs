@@ -2,17 +2,12 @@
 
 use crate::motion::derivatives::mean_rate;
 use crate::motion::even::{is_even, resample_evenly};
-use crate::motion::thresholds::{
-    BAND_FEWEST_PERIODS, BAND_HIGHEST_SHARE, FORCE_BAND_FACTOR, MOTION_POWER_SHARE,
-};
+use crate::motion::thresholds::{BAND_FEWEST_PERIODS, BAND_HIGHEST_SHARE, FORCE_BAND_FACTOR, MOTION_POWER_SHARE};
 use crate::signal::hann_power;
 
 /// Highest frequency at which forces follow a motion, Hz; at most a fifth of the sampling rate. `None` if nothing
 /// moves.
-pub(crate) fn motion_band<'a>(
-    time: &[f64],
-    positions: impl IntoIterator<Item = &'a [f64]>,
-) -> Option<f64> {
+pub(crate) fn motion_band<'a>(time: &[f64], positions: impl IntoIterator<Item = &'a [f64]>) -> Option<f64> {
     let rate = mean_rate(time);
     // The frequency of each coordinate below which its power lies.
     let reach = positions.into_iter().filter_map(|q| {

@@ -8,8 +8,8 @@
 use std::f64::consts::{LN_10, PI, TAU};
 
 use crate::motion::thresholds::{
-    CUTOFF_ERROR_RATIO, CUTOFF_FEWEST_PERIODS, CUTOFF_FEWEST_SAMPLES, CUTOFF_HIGHEST_SHARE,
-    CUTOFF_NEGLIGIBLE_SQUARE, MOTION_NOISE_RATIO, TRIM_ONE_IN, TRIMMED_PERIODS,
+    CUTOFF_ERROR_RATIO, CUTOFF_FEWEST_PERIODS, CUTOFF_FEWEST_SAMPLES, CUTOFF_HIGHEST_SHARE, CUTOFF_NEGLIGIBLE_SQUARE,
+    MOTION_NOISE_RATIO, TRIM_ONE_IN, TRIMMED_PERIODS,
 };
 use crate::signal::{float_to_count, hann_power, median};
 
@@ -41,11 +41,7 @@ pub(crate) struct DifferentiatedSignal<'a> {
 /// A low cut-off loses more samples at the ends. Therefore the highest cut-off is returned whose expected error is
 /// within a quarter of the smallest, or below 0.03 % of the acceleration. It is never above a fifth of the sampling
 /// rate, where central differences attenuate more than the filter.
-pub(crate) fn choose_cutoff(
-    signals: &[DifferentiatedSignal<'_>],
-    rate_hz: f64,
-    order: usize,
-) -> Option<f64> {
+pub(crate) fn choose_cutoff(signals: &[DifferentiatedSignal<'_>], rate_hz: f64, order: usize) -> Option<f64> {
     let samples = signals.first()?.values.len();
     if samples < CUTOFF_FEWEST_SAMPLES || !(rate_hz > 0.0 && rate_hz.is_finite()) {
         return None;
@@ -75,12 +71,8 @@ pub(crate) fn choose_cutoff(
             (cutoff, errors.sum())
         })
         .collect();
-    let smallest = costs
-        .iter()
-        .map(|(_, cost)| *cost)
-        .fold(f64::INFINITY, f64::min);
-    let bearable = (CUTOFF_ERROR_RATIO.powi(2) * smallest)
-        .max(CUTOFF_NEGLIGIBLE_SQUARE * spectra.len() as f64);
+    let smallest = costs.iter().map(|(_, cost)| *cost).fold(f64::INFINITY, f64::min);
+    let bearable = (CUTOFF_ERROR_RATIO.powi(2) * smallest).max(CUTOFF_NEGLIGIBLE_SQUARE * spectra.len() as f64);
     costs
         .into_iter()
         .filter(|(_, cost)| *cost <= bearable)
@@ -115,29 +107,18 @@ impl AccelerationSpectrum {
         // Differences of neighbouring samples, as a first estimate of the acceleration.
         let mut differences = signal.values.to_vec();
         for _ in 0..signal.derivative_order {
-            differences = differences
-                .windows(2)
-                .map(|w| (w[1] - w[0]) * rate_hz)
-                .collect();
+            differences = differences.windows(2).map(|w| (w[1] - w[0]) * rate_hz).collect();
         }
         let power = hann_power(&differences);
         let bins = power.len();
         let angle = |k: usize| PI * k as f64 / (bins - 1) as f64;
-        let shape = |k: usize| {
-            (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order))
-        };
+        let shape = |k: usize| (2.0 * rate_hz * (0.5 * angle(k)).sin()).powi(2 * i32::from(signal.derivative_order));
         // The level of the noise in the upper quarter of the band.
-        let upper: Vec<f64> = (bins * 3 / 4..bins - 1)
-            .map(|k| power[k] / shape(k))
-            .collect();
+        let upper: Vec<f64> = (bins * 3 / 4..bins - 1).map(|k| power[k] / shape(k)).collect();
         // The median ignores lines. The means below it are needed if the noise itself consists of lines, as in a run
         // that was made of copies.
         let means = upper.chunks(upper.len().div_ceil(64).max(16));
-        let noise = median(
-            means
-                .map(|c| c.iter().sum::<f64>() / c.len() as f64)
-                .collect(),
-        );
+        let noise = median(means.map(|c| c.iter().sum::<f64>() / c.len() as f64).collect());
         let mut motion = Vec::new();
         // The window and the padding spread one frequency over several bins, so bands have a least width.
         let narrowest = (8 * bins).div_ceil(differences.len());
@@ -169,13 +150,7 @@ impl AccelerationSpectrum {
 
     /// Expected squared error of the filtered acceleration, relative to the square of its size plus that error. The
     /// filter has the gain `passed` at each frequency, and noise of power 1 becomes noise of power `noise`.
-    fn relative_error(
-        &self,
-        passed: &[f64],
-        noise: f64,
-        gains: &FilterGains,
-        transient: f64,
-    ) -> f64 {
+    fn relative_error(&self, passed: &[f64], noise: f64, gains: &FilterGains, transient: f64) -> f64 {
         let times = i32::from(self.derivative_order);
         let mut error = self.noise * noise;
         let mut size = 0.0;
@@ -209,10 +184,7 @@ impl FilterGains {
         let angles = (0..bins).map(|k| 0.5 * TAU * k as f64 / (bins - 1) as f64);
         Self {
             power,
-            warped: angles
-                .clone()
-                .map(|a| (0.5 * a).tan().powi(power))
-                .collect(),
+            warped: angles.clone().map(|a| (0.5 * a).tan().powi(power)).collect(),
             sine: angles.clone().map(f64::sin).collect(),
             difference: angles.map(|a| a.sin() / a).collect(),
         }
@@ -283,19 +255,11 @@ mod tests {
                 })
                 .collect();
             let error = |cutoff: f64| {
-                let qdd = filter_and_differentiate(&time, &positions, cutoff, 4)
-                    .unwrap()
-                    .qdd;
+                let qdd = filter_and_differentiate(&time, &positions, cutoff, 4).unwrap().qdd;
                 let inner = 400..3245;
-                (inner
-                    .clone()
-                    .map(|i| (qdd[i] - truth(time[i])).powi(2))
-                    .sum::<f64>()
-                    / inner.len() as f64)
-                    .sqrt()
+                (inner.clone().map(|i| (qdd[i] - truth(time[i])).powi(2)).sum::<f64>() / inner.len() as f64).sqrt()
             };
-            let size =
-                (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
+            let size = (time.iter().map(|t| truth(*t).powi(2)).sum::<f64>() / time.len() as f64).sqrt();
             let chosen = choose_cutoff(&[twice(&positions)], rate, 4).unwrap();
             let best = (0..60)
                 .map(|i| error(0.6 * 1.09_f64.powi(i)))

@@ -51,10 +51,7 @@ pub fn decimate_time(time: &[f64], factor: usize) -> Vec<f64> {
 /// Fails as [`decimate`] does.
 pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64>>, FilterError> {
     if factor < 2 {
-        return columns
-            .iter()
-            .map(|column| decimate(column, factor))
-            .collect();
+        return columns.iter().map(|column| decimate(column, factor)).collect();
     }
     let mut short = Vec::with_capacity(columns.len());
     // Groups of columns are filtered together; a small group uses fewer lanes.
@@ -69,10 +66,7 @@ pub fn decimate_columns(columns: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64
 }
 
 /// [`decimate_columns`] of at most `N` columns.
-fn decimate_group<const N: usize>(
-    group: &[&[f64]],
-    factor: usize,
-) -> Result<Vec<Vec<f64>>, FilterError> {
+fn decimate_group<const N: usize>(group: &[&[f64]], factor: usize) -> Result<Vec<Vec<f64>>, FilterError> {
     let samples = group.iter().map(|column| column.len()).min().unwrap_or(0);
     // Interleave the columns, one lane per column.
     let mut lanes = vec![[0.0; N]; samples];
@@ -87,10 +81,7 @@ fn decimate_group<const N: usize>(
 }
 
 /// Every `factor`-th sample of interleaved columns.
-fn decimate_lanes<const N: usize>(
-    lanes: &[[f64; N]],
-    factor: usize,
-) -> Result<Vec<[f64; N]>, FilterError> {
+fn decimate_lanes<const N: usize>(lanes: &[[f64; N]], factor: usize) -> Result<Vec<[f64; N]>, FilterError> {
     if factor >= lanes.len() {
         return Err(FilterError::FactorOutOfRange { factor });
     }

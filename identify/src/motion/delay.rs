@@ -76,9 +76,7 @@ mod tests {
 
     /// Uneven samples of cubics, with the time itself as the force.
     fn run(n: u32) -> PreparedRun {
-        let time: Vec<f64> = (0..n)
-            .map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3))
-            .collect();
+        let time: Vec<f64> = (0..n).map(|i| 0.01 * f64::from(i) + 0.003 * f64::from(i % 3)).collect();
         let column = |of: fn(f64) -> f64| vec![time.iter().map(|t| of(*t)).collect()];
         PreparedRun {
             file: "run.csv".to_owned(),
@@ -100,9 +98,7 @@ mod tests {
     fn cubics_are_met_exactly_and_lost_samples_are_counted() {
         for delay in [0.0, 0.0042, -0.0042, 0.013, 0.25] {
             let mut moved = run(60);
-            let lost = moved
-                .shift_states_by_delay(delay)
-                .expect("samples are left");
+            let lost = moved.shift_states_by_delay(delay).expect("samples are left");
             let n = moved.time.len();
             assert_eq!(n + lost.0 + lost.1, 60);
             assert_eq!(lost.0 > 0, delay > 0.0);

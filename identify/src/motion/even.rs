@@ -5,9 +5,7 @@
 //! times has an error of fourth order in the step, far below that of a filter. Source: C. de Boor, "A Practical Guide
 //! to Splines" (1978), chapter IV, with second derivatives of zero at the ends.
 
-use crate::motion::thresholds::{
-    EVEN_TIMES_TOLERANCE, ROUNDED_MOST_DECIMALS, ROUNDED_TIMES_TOLERANCE,
-};
+use crate::motion::thresholds::{EVEN_TIMES_TOLERANCE, ROUNDED_MOST_DECIMALS, ROUNDED_TIMES_TOLERANCE};
 
 /// How the times of samples are spaced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,16 +46,13 @@ pub(crate) fn is_even(time: &[f64]) -> bool {
 fn timestamp_resolution(time: &[f64]) -> f64 {
     let has = |decimals: i32| {
         let scale = 10.0_f64.powi(decimals);
-        let is_whole =
-            |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
+        let is_whole = |t: &f64| (t * scale - (t * scale).round()).abs() < 1e-9 * (t * scale).abs().max(1.0);
         time.iter().all(is_whole)
     };
     (0..=ROUNDED_MOST_DECIMALS)
         .find(|decimals| has(*decimals))
         // The line through rounded times has a small error itself.
-        .map_or(0.0, |decimals| {
-            ROUNDED_TIMES_TOLERANCE * 10.0_f64.powi(-decimals)
-        })
+        .map_or(0.0, |decimals| ROUNDED_TIMES_TOLERANCE * 10.0_f64.powi(-decimals))
 }
 
 /// As many even times as there are samples, on the least squares line through their times.
@@ -72,9 +67,7 @@ pub(crate) fn even_times(time: &[f64]) -> Vec<f64> {
         size += k * k;
     }
     let step = if size > 0.0 { slope / size } else { 0.0 };
-    (0..time.len())
-        .map(|k| mean + step * (k as f64 - middle))
-        .collect()
+    (0..time.len()).map(|k| mean + step * (k as f64 - middle)).collect()
 }
 
 /// As many even times as there are samples, from the first time to the last.
@@ -110,8 +103,7 @@ impl<'a> CubicSpline<'a> {
             let (mut upper, mut right) = (vec![0.0; n], vec![0.0; n]);
             for i in 1..n - 1 {
                 let [before, after] = [time[i] - time[i - 1], time[i + 1] - time[i]];
-                let slopes =
-                    (values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before;
+                let slopes = (values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before;
                 let pivot = 2.0 * (before + after) - before * upper[i - 1];
                 upper[i] = after / pivot;
                 right[i] = (6.0 * slopes - before * right[i - 1]) / pivot;
@@ -141,8 +133,7 @@ impl<'a> CubicSpline<'a> {
             }
             let step = self.time[i + 1] - self.time[i];
             let [a, b] = [(self.time[i + 1] - t) / step, (t - self.time[i]) / step];
-            let bend = (a.powi(3) - a) * self.second_derivatives[i]
-                + (b.powi(3) - b) * self.second_derivatives[i + 1];
+            let bend = (a.powi(3) - a) * self.second_derivatives[i] + (b.powi(3) - b) * self.second_derivatives[i + 1];
             a * self.values[i] + b * self.values[i + 1] + bend * step * step / 6.0
         };
         times.iter().map(at).collect()
@@ -155,14 +146,9 @@ mod tests {
 
     #[test]
     fn rounded_stamps_are_even_and_jitter_is_not() {
-        let stamps = |off: fn(u32) -> f64| -> Vec<f64> {
-            (0..400).map(|k| f64::from(k) / 300.0 + off(k)).collect()
-        };
+        let stamps = |off: fn(u32) -> f64| -> Vec<f64> { (0..400).map(|k| f64::from(k) / 300.0 + off(k)).collect() };
         assert!(is_even(&stamps(|_| 0.0)));
-        let rounded: Vec<f64> = stamps(|_| 0.0)
-            .into_iter()
-            .map(|t| (1e4 * t).round() / 1e4)
-            .collect();
+        let rounded: Vec<f64> = stamps(|_| 0.0).into_iter().map(|t| (1e4 * t).round() / 1e4).collect();
         assert!(is_even(&rounded));
         assert!(!is_even(&stamps(|k| 2e-5 * f64::from(k * k % 7) / 7.0)));
         let mut lost = rounded;

@@ -24,11 +24,7 @@ pub(crate) fn half_width(cutoff_hz: f64, rate_hz: f64) -> usize {
 
 /// Smoothed positions with both derivatives from windows of `2 half_width + 1` samples; `None` if there are fewer
 /// samples.
-pub(crate) fn smooth_by_polynomials(
-    time: &[f64],
-    positions: &[f64],
-    half_width: usize,
-) -> Option<SmoothedCoordinate> {
+pub(crate) fn smooth_by_polynomials(time: &[f64], positions: &[f64], half_width: usize) -> Option<SmoothedCoordinate> {
     let n = time.len();
     let width = 2 * half_width + 1;
     if n < width || width <= TERMS {
@@ -94,10 +90,7 @@ mod tests {
         let time: Vec<f64> = (0..4000).map(|i| f64::from(i) / rate).collect();
         let mut noise = TestNoise::new(3);
         let w = std::f64::consts::TAU * 1.5;
-        let q: Vec<f64> = time
-            .iter()
-            .map(|t| (w * t).sin() + 1e-5 * noise.normal())
-            .collect();
+        let q: Vec<f64> = time.iter().map(|t| (w * t).sin() + 1e-5 * noise.normal()).collect();
         let found = smooth_by_polynomials(&time, &q, half_width(15.0, rate)).unwrap();
         let error: f64 = (100..3900)
             .map(|i| (found.qdd[i] + w * w * (w * time[i]).sin()).powi(2))

@@ -22,9 +22,7 @@ mod series;
 mod smooth;
 mod thresholds;
 
-pub use decimation::{
-    DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time,
-};
+pub use decimation::{DECIMATION_PASSBAND, decimate, decimate_columns, decimate_table, decimate_time};
 pub(crate) use derivatives::mean_rate;
 pub use derivatives::{SmoothedCoordinate, differentiate, filter_and_differentiate};
 pub(crate) use even::{is_even, resample_evenly};

@@ -8,8 +8,8 @@ use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 
 use crate::motion::thresholds::{
-    FORCE_JUMP_INTERIOR, FORCE_JUMP_RATIO, PERIOD_FEWEST_SAMPLES, PERIOD_LEFT_DIFFERENCE,
-    PERIOD_MOST_DIFFERENCE, PERIOD_RETURNED_DIFFERENCE, PHASE_MOST_STEPS,
+    FORCE_JUMP_INTERIOR, FORCE_JUMP_RATIO, PERIOD_FEWEST_SAMPLES, PERIOD_LEFT_DIFFERENCE, PERIOD_MOST_DIFFERENCE,
+    PERIOD_RETURNED_DIFFERENCE, PHASE_MOST_STEPS,
 };
 use crate::signal::{float_to_count, median};
 
@@ -78,8 +78,7 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
         .iter()
         .map(|(q, variance)| {
             let scale = (2.0 * variance * moving.len() as f64).sqrt();
-            let at =
-                |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
+            let at = |i: usize| interpolate(time, &q[..time.len()], start + step * i as f64) / scale;
             (0..m).map(at).collect()
         })
         .collect();
@@ -98,9 +97,8 @@ fn coarse_period(time: &[f64], moving: &[(&[f64], f64)]) -> Option<(f64, f64)> {
     let far: Vec<f64> = (0..=m / 2 + 2).map(apart).collect();
     // The motion must leave its start before it can return.
     let left = far.iter().position(|d| *d > PERIOD_LEFT_DIFFERENCE)?;
-    let candidate = (left + 1..far.len() - 1).find(|i| {
-        far[*i] < PERIOD_RETURNED_DIFFERENCE && far[*i] <= far[i - 1] && far[*i] <= far[i + 1]
-    })?;
+    let candidate = (left + 1..far.len() - 1)
+        .find(|i| far[*i] < PERIOD_RETURNED_DIFFERENCE && far[*i] <= far[i - 1] && far[*i] <= far[i + 1])?;
     Some((step * candidate as f64, step))
 }
 
@@ -160,8 +158,7 @@ pub(crate) fn measure_repeatability(
         // At a reversal of friction a force between two samples is not known.
         let usual = median(force.windows(2).map(|w| (w[1] - w[0]).abs()).collect());
         let jumps = |(i, part): &(usize, f64)| {
-            FORCE_JUMP_INTERIOR.contains(part)
-                && (force[i + 1] - force[*i]).abs() > FORCE_JUMP_RATIO * usual
+            FORCE_JUMP_INTERIOR.contains(part) && (force[i + 1] - force[*i]).abs() > FORCE_JUMP_RATIO * usual
         };
         let mut values = 0;
         for place in places.iter().filter(|place| !place.iter().any(jumps)) {
@@ -259,10 +256,7 @@ mod tests {
     fn the_period_is_found_on_the_true_time_base() {
         let time = times(2500);
         let mut noise = TestNoise::new(4);
-        let q: Vec<f64> = time
-            .iter()
-            .map(|t| motion(*t) + 1e-4 * noise.normal())
-            .collect();
+        let q: Vec<f64> = time.iter().map(|t| motion(*t) + 1e-4 * noise.normal()).collect();
         let period = find_period(&time, &[&q, &vec![1.0; q.len()]]).expect("a period");
         assert!((period - PERIOD).abs() < 1e-3, "{period}");
         // Less than two periods, or none at all.
@@ -298,8 +292,7 @@ mod tests {
                 })
                 .collect();
             let size = (force.iter().map(|f| f * f).sum::<f64>() / force.len() as f64).sqrt();
-            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force])
-                .expect("ten periods");
+            let found = measure_repeatability(&time, PERIOD, &["a".to_owned()], &[force]).expect("ten periods");
             assert_eq!(found.periods, 10);
             assert!(
                 (found.noise_floor * size / 0.3 - 1.0).abs() < 0.05,

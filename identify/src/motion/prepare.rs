@@ -10,8 +10,8 @@ use crate::motion::run::PreparedRun;
 use crate::motion::series::{self, PeriodicSeries};
 use crate::motion::smooth::{RecordedCoordinate, SmoothingFilter};
 use crate::motion::thresholds::{
-    CUTOFF_WITHOUT_MOTION_SHARE, PERIOD_LONGEST_DURATIONS, PERIOD_SHORTEST_STEPS,
-    PLANNED_MOST_HARMONICS, TRIM_ONE_IN, TRIMMED_PERIODS,
+    CUTOFF_WITHOUT_MOTION_SHARE, PERIOD_LONGEST_DURATIONS, PERIOD_SHORTEST_STEPS, PLANNED_MOST_HARMONICS, TRIM_ONE_IN,
+    TRIMMED_PERIODS,
 };
 use crate::motion::{local_polynomials, periods};
 use crate::recording::{RecordingError, RecordingFault, RecordingNote, SignalRecording};
@@ -34,13 +34,9 @@ impl SignalRecording {
         notes: &mut Vec<RecordingNote>,
     ) -> Result<Vec<[Vec<f64>; 3]>, RecordingError> {
         // Coordinates with both derivatives need no preparation.
-        let incomplete: Vec<&RecordedCoordinate<'_>> =
-            columns.iter().filter(|c| !c.is_complete()).collect();
+        let incomplete: Vec<&RecordedCoordinate<'_>> = columns.iter().filter(|c| !c.is_complete()).collect();
         if incomplete.is_empty() {
-            return Ok(columns
-                .iter()
-                .filter_map(RecordedCoordinate::recorded_states)
-                .collect());
+            return Ok(columns.iter().filter_map(RecordedCoordinate::recorded_states).collect());
         }
         prepared.coordinates = incomplete.iter().map(|c| c.name.clone()).collect();
         let order = preparation.order;
@@ -96,9 +92,7 @@ impl SignalRecording {
                 period: found.period,
                 harmonics: found.harmonics,
             },
-            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => {
-                SmoothingFilter::Butterworth { order }
-            }
+            (SmoothingMethod::Automatic | SmoothingMethod::Butterworth, None) => SmoothingFilter::Butterworth { order },
             (SmoothingMethod::SavitzkyGolay, None) => SmoothingFilter::Polynomials {
                 half_width: local_polynomials::half_width(cutoff, rate),
             },
@@ -108,10 +102,7 @@ impl SignalRecording {
                 let period = period.or_else(|| periods::find_period(time, &positions));
                 let period = period.ok_or_else(|| self.fault(RecordingFault::NoPeriod))?;
                 let duration = time[time.len() - 1] - time[0];
-                let (shortest, longest) = (
-                    PERIOD_SHORTEST_STEPS / rate,
-                    PERIOD_LONGEST_DURATIONS * duration,
-                );
+                let (shortest, longest) = (PERIOD_SHORTEST_STEPS / rate, PERIOD_LONGEST_DURATIONS * duration);
                 if !(shortest..longest).contains(&period) {
                     return Err(self.fault(RecordingFault::Period {
                         period,
@@ -128,17 +119,14 @@ impl SignalRecording {
         prepared.cutoff_chosen = preparation.cutoff_hz.is_none() || preparation.chosen;
         // A series has no transients at the ends.
         if !matches!(way, SmoothingFilter::Series { .. }) {
-            prepared.trimmed =
-                self.transient_samples(rate / cutoff, time.len(), preparation, notes);
+            prepared.trimmed = self.transient_samples(rate / cutoff, time.len(), preparation, notes);
         }
         if let SmoothingFilter::Series { period, .. } = way {
             prepared.period = Some(period);
         }
         // The user is informed about the choice.
         if let Some(found) = &found {
-            notes.push(RecordingNote::info(
-                self.describe_series(found, &incomplete),
-            ));
+            notes.push(RecordingNote::info(self.describe_series(found, &incomplete)));
         } else {
             notes.push(RecordingNote::info(format!(
                 "Derivatives of {} in {} are prepared: {}.",
@@ -209,16 +197,9 @@ impl SignalRecording {
 }
 
 /// The cut-off that fits the columns to be differentiated; uneven samples are interpolated to even times first.
-fn choose_cutoff_for(
-    time: &[f64],
-    columns: &[&RecordedCoordinate<'_>],
-    order: usize,
-) -> Option<f64> {
+fn choose_cutoff_for(time: &[f64], columns: &[&RecordedCoordinate<'_>], order: usize) -> Option<f64> {
     let rate = mean_rate(time);
-    let sources: Vec<DifferentiatedSignal<'_>> = columns
-        .iter()
-        .map(|c| c.signal_to_differentiate())
-        .collect();
+    let sources: Vec<DifferentiatedSignal<'_>> = columns.iter().map(|c| c.signal_to_differentiate()).collect();
     if is_even(time) {
         return choose_cutoff(&sources, rate, order);
     }
@@ -257,9 +238,8 @@ impl SignalRecording {
     ) -> Result<Option<PreparationChoices>, RecordingError> {
         let usual = StatePreparation::default();
         // Any of the three options makes the choice of the user.
-        let is_open = preparation.cutoff_hz.is_none()
-            && preparation.smoothing == usual.smoothing
-            && preparation.decimate <= 1;
+        let is_open =
+            preparation.cutoff_hz.is_none() && preparation.smoothing == usual.smoothing && preparation.decimate <= 1;
         if !is_open {
             return Ok(None);
         }
@@ -274,9 +254,7 @@ impl SignalRecording {
         let found = longest.and_then(|run| {
             let prepared = &run.prepared;
             let cutoff = prepared.cutoff_hz.filter(|cutoff| {
-                let harmonics = prepared
-                    .period
-                    .map_or(f64::INFINITY, |period| cutoff * period);
+                let harmonics = prepared.period.map_or(f64::INFINITY, |period| cutoff * period);
                 harmonics > PLANNED_MOST_HARMONICS
             });
             Some((mean_rate(&run.time), prepared.band_hz?, cutoff?))

@@ -13,8 +13,8 @@ use crate::motion::run::PreparedRun;
 use crate::motion::series::PeriodicSeries;
 use crate::motion::smooth::RecordedCoordinate;
 use crate::motion::thresholds::{
-    ENCODER_EQUAL_ONE_IN, ENCODER_NOISE_SHARE, ENCODER_ON_GRID_SHARE, ENCODER_STEP_TOLERANCE,
-    MAX_SERIES_RESIDUAL, STANDSTILL_ONE_IN, STANDSTILL_RATE_SHARE,
+    ENCODER_EQUAL_ONE_IN, ENCODER_NOISE_SHARE, ENCODER_ON_GRID_SHARE, ENCODER_STEP_TOLERANCE, MAX_SERIES_RESIDUAL,
+    STANDSTILL_ONE_IN, STANDSTILL_RATE_SHARE,
 };
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::words::{backquoted_list, count_of, seven_digits, with_digits};
@@ -71,11 +71,7 @@ impl SignalRecording {
     }
 
     /// The note on a series that was chosen automatically, with its residual for each coordinate.
-    pub(crate) fn describe_series(
-        &self,
-        found: &PeriodicSeries,
-        columns: &[&RecordedCoordinate<'_>],
-    ) -> Message {
+    pub(crate) fn describe_series(&self, found: &PeriodicSeries, columns: &[&RecordedCoordinate<'_>]) -> Message {
         let names: Vec<String> = columns.iter().map(|column| column.name.clone()).collect();
         // Residuals of rates are marked, because these were fitted if they are recorded.
         let left = columns.iter().zip(&found.noise).map(|(column, noise)| {
@@ -119,11 +115,7 @@ impl SignalRecording {
     }
 
     /// Warns of encoders whose steps cause noise in the accelerations.
-    pub(crate) fn note_encoder_steps(
-        &self,
-        columns: &[RecordedCoordinate<'_>],
-        run: &mut PreparedRun,
-    ) {
+    pub(crate) fn note_encoder_steps(&self, columns: &[RecordedCoordinate<'_>], run: &mut PreparedRun) {
         let Some(cutoff) = run.prepared.cutoff_hz else {
             return;
         };
@@ -140,8 +132,7 @@ impl SignalRecording {
                 continue;
             };
             // White noise with variance step^2/12 below the cut-off, differentiated twice.
-            let noise =
-                step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
+            let noise = step / 12.0_f64.sqrt() * (2.0 / rate * TAU.powi(4) * cutoff.powi(5) / 5.0).sqrt();
             let size = (qdd.iter().map(|a| a * a).sum::<f64>() / qdd.len() as f64).sqrt();
             if noise > ENCODER_NOISE_SHARE * size && size > 0.0 {
                 found.push(format!(
@@ -168,9 +159,7 @@ impl SignalRecording {
         for (name, q) in coordinates.iter().zip(&run.q) {
             let (low, high) = q
                 .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-                    (l.min(*v), h.max(*v))
-                });
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
             if q.len() > 1 && high <= low {
                 run.notes.push(RecordingNote::warning(format!(
                     "`{name}` does not move in {}: parameters that depend on its motion cannot be identified.",

@@ -15,12 +15,10 @@ use crate::motion::prepare::find_motion_series;
 use crate::motion::prepared_as::PreparationRecord;
 use crate::motion::smooth::RecordedCoordinate;
 use crate::motion::thresholds::{
-    BRIDGED_GAP_PART, JITTER_LONG_STEPS_PER_SHORT, JITTER_ONE_IN, JITTER_STEP_MARGIN,
-    MISSING_SAMPLE_STEP, SHORT_STEP,
+    BRIDGED_GAP_PART, JITTER_LONG_STEPS_PER_SHORT, JITTER_ONE_IN, JITTER_STEP_MARGIN, MISSING_SAMPLE_STEP, SHORT_STEP,
 };
 use crate::recording::{
-    GAP_LEAST_STEPS, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording,
-    sample_place_word,
+    GAP_LEAST_STEPS, NoteSeverity, RecordingError, RecordingFault, RecordingNote, SignalRecording, sample_place_word,
 };
 use crate::signal::median;
 use crate::words::{backquoted_list, count_of};
@@ -59,11 +57,7 @@ pub struct PreparedRun {
 impl SignalRecording {
     /// States of the given coordinates and forces of the given drives with the default [`StatePreparation`]. The
     /// columns are `t`, `NAME`, `NAME_d`, `NAME_dd` and the name of the drive.
-    pub fn states(
-        &self,
-        coordinates: &[String],
-        drives: &[String],
-    ) -> Result<PreparedRun, RecordingError> {
+    pub fn states(&self, coordinates: &[String], drives: &[String]) -> Result<PreparedRun, RecordingError> {
         self.states_with(coordinates, drives, &StatePreparation::default())
     }
 
@@ -82,10 +76,7 @@ impl SignalRecording {
             .chain(coordinates.iter().cloned())
             .collect();
         self.check_columns(&needed, &wanted)?;
-        self.check_time(
-            self.column_without_suggesting("t", &wanted)?,
-            &mut Vec::new(),
-        )?;
+        self.check_time(self.column_without_suggesting("t", &wanted)?, &mut Vec::new())?;
         let columns: Result<Vec<RecordedCoordinate<'_>>, _> = coordinates
             .iter()
             .map(|name| self.recorded_coordinate(name, preparation.source, &wanted))
@@ -94,7 +85,7 @@ impl SignalRecording {
         // Splitting is needed only if a filter would extend across a gap.
         let is_filtered = preparation.decimate > 1 || columns.iter().any(|c| !c.is_complete());
         let time = self.column("t")?;
-        let stretches = if is_filtered && !even::is_even(time) {
+        let segments = if is_filtered && !even::is_even(time) {
             let positions = columns.iter().map(|c| c.q);
             let bridged = band::motion_band(time, positions).map(|band| BRIDGED_GAP_PART / band);
             self.split_at_gaps(bridged.unwrap_or(0.0))
@@ -102,9 +93,8 @@ impl SignalRecording {
             Vec::new()
         };
         // A series is fitted at the true times, so gaps do not matter; only decimation would extend across them.
-        let is_whole = stretches.len() < 2
-            || preparation.decimate <= 1
-                && find_motion_series(self.column("t")?, &columns, preparation).is_some();
+        let is_whole = segments.len() < 2
+            || preparation.decimate <= 1 && find_motion_series(self.column("t")?, &columns, preparation).is_some();
         if is_whole {
             return Ok(vec![self.states_with(coordinates, drives, preparation)?]);
         }
@@ -117,9 +107,9 @@ impl SignalRecording {
             ..preparation.clone()
         };
         // The longest segment decides about the cut-off.
-        let longest = (0..stretches.len()).max_by_key(|i| stretches[*i].samples());
+        let longest = (0..segments.len()).max_by_key(|i| segments[*i].samples());
         let longest = longest.unwrap_or(0);
-        let first = stretches[longest].states_with(coordinates, drives, preparation)?;
+        let first = segments[longest].states_with(coordinates, drives, preparation)?;
         // All segments have the cut-off of the longest one.
         let preparation = StatePreparation {
             cutoff_hz: preparation.cutoff_hz.or(first.prepared.cutoff_hz),
@@ -128,11 +118,11 @@ impl SignalRecording {
         // Segments that are too short are counted, all other faults end the preparation.
         let mut runs = Vec::new();
         let (mut short, mut left_out) = (0, 0);
-        for (i, stretch) in stretches.iter().enumerate() {
+        for (i, segment) in segments.iter().enumerate() {
             let run = if i == longest {
                 Ok(first.clone())
             } else {
-                stretch.states_with(coordinates, drives, &preparation)
+                segment.states_with(coordinates, drives, &preparation)
             };
             match run {
                 Ok(run) => runs.push(run),
@@ -143,23 +133,23 @@ impl SignalRecording {
                     ) =>
                 {
                     short += 1;
-                    left_out += stretch.samples();
+                    left_out += segment.samples();
                 }
                 Err(error) => return Err(error),
             }
         }
         // The notes of the recording come first, then one on the gaps.
         let mut notes = self.notes().to_vec();
-        let breaks = stretches[..stretches.len() - 1].iter();
-        let places = breaks.filter_map(|stretch| stretch.line(stretch.samples() - 1));
+        let breaks = segments[..segments.len() - 1].iter();
+        let places = breaks.filter_map(|segment| segment.line(segment.samples() - 1));
         let mut says = format!(
             "{} has {} in time of more than {GAP_LEAST_STEPS} usual steps that {} too long for this motion to be bridged, the first after \
              line {}: the {} segments are filtered and differentiated separately.",
             self.file(),
-            count_of(stretches.len() - 1, "gap", "gaps"),
-            if stretches.len() == 2 { "is" } else { "are" },
+            count_of(segments.len() - 1, "gap", "gaps"),
+            if segments.len() == 2 { "is" } else { "are" },
             places.min().unwrap_or(0),
-            stretches.len(),
+            segments.len(),
         );
         if short > 0 {
             let _ = write!(
@@ -178,8 +168,7 @@ impl SignalRecording {
         // Notes that all segments share are kept for the first one only.
         for (i, run) in runs.iter_mut().enumerate() {
             if i > 0 {
-                run.notes
-                    .retain(|note| note.severity == NoteSeverity::Warning);
+                run.notes.retain(|note| note.severity == NoteSeverity::Warning);
             }
         }
         if let Some(run) = runs.first_mut() {
@@ -208,11 +197,7 @@ impl SignalRecording {
         let mut notes = self.notes().to_vec();
         self.check_time(time, &mut notes)?;
         // Forces are complete or absent: with one missing force none is used.
-        let missing_force: Vec<String> = drives
-            .iter()
-            .filter(|drive| !self.has_column(drive))
-            .cloned()
-            .collect();
+        let missing_force: Vec<String> = drives.iter().filter(|drive| !self.has_column(drive)).cloned().collect();
         let force = if missing_force.is_empty() {
             let columns: Result<Vec<Vec<f64>>, _> = drives
                 .iter()
@@ -253,10 +238,7 @@ impl SignalRecording {
             qdd: Vec::new(),
             force,
             missing_force,
-            left_out: if drives
-                .iter()
-                .any(|drive| self.lost_samples(drive).is_some())
-            {
+            left_out: if drives.iter().any(|drive| self.lost_samples(drive).is_some()) {
                 let lost = |drive: &String| {
                     let lost = self.lost_samples(drive).map(<[bool]>::to_vec);
                     lost.unwrap_or_else(|| vec![false; time.len()])
@@ -306,11 +288,7 @@ impl SignalRecording {
     }
 
     /// Fails unless time increases; uneven steps and gaps are reported.
-    fn check_time(
-        &self,
-        time: &[f64],
-        notes: &mut Vec<RecordingNote>,
-    ) -> Result<(), RecordingError> {
+    fn check_time(&self, time: &[f64], notes: &mut Vec<RecordingNote>) -> Result<(), RecordingError> {
         if let Some(i) = time.windows(2).position(|w| w[1] <= w[0]) {
             let line = self.line(i + 1).unwrap_or(0);
             return Err(self.fault(RecordingFault::TimeNotIncreasing {
@@ -334,8 +312,7 @@ impl SignalRecording {
         // suggests.
         let many = |is: &dyn Fn(f64) -> bool| steps.iter().filter(|step| is(**step)).count();
         let short = many(&|step| step < SHORT_STEP * median);
-        let jitters = JITTER_LONG_STEPS_PER_SHORT * short
-            > many(&|step| step > MISSING_SAMPLE_STEP * median)
+        let jitters = JITTER_LONG_STEPS_PER_SHORT * short > many(&|step| step > MISSING_SAMPLE_STEP * median)
             && JITTER_ONE_IN * short > steps.len();
         let longer = if jitters {
             (JITTER_STEP_MARGIN * (2.0 * median - shortest)).max(MISSING_SAMPLE_STEP * median)
@@ -400,13 +377,7 @@ impl SignalRecording {
             out.drain(..start);
         }
         let forces = run.force.iter_mut().flatten();
-        for column in run
-            .q
-            .iter_mut()
-            .chain(&mut run.qd)
-            .chain(&mut run.qdd)
-            .chain(forces)
-        {
+        for column in run.q.iter_mut().chain(&mut run.qd).chain(&mut run.qdd).chain(forces) {
             cut(column);
         }
         run.notes.push(RecordingNote::info(message!(

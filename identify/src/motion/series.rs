@@ -15,8 +15,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use crate::motion::derivatives::SmoothedCoordinate;
 use crate::motion::periods::find_period;
 use crate::motion::thresholds::{
-    MIN_LINE_POWER_RATIO, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE,
-    SERIES_MOST_HARMONICS, SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
+    MIN_LINE_POWER_RATIO, SERIES_CLOSED_STEPS, SERIES_FEWEST_SAMPLES, SERIES_HIGHEST_SHARE, SERIES_MOST_HARMONICS,
+    SERIES_SAMPLES_PER_COLUMN, WHITE_MEAN_SIGMAS,
 };
 use crate::signal::{float_to_count, hann_power};
 
@@ -57,8 +57,7 @@ impl<'a> FourierBasis<'a> {
     /// distinguish them.
     fn new(time: &'a [f64], period: f64, harmonics: usize) -> Option<Self> {
         let columns = 2 * harmonics + 1;
-        if time.len() < SERIES_SAMPLES_PER_COLUMN * columns || !(period > 0.0 && period.is_finite())
-        {
+        if time.len() < SERIES_SAMPLES_PER_COLUMN * columns || !(period > 0.0 && period.is_finite()) {
             return None;
         }
         // Products of sines and cosines are sums of those of up to twice as many harmonics. So all entries of the
@@ -122,8 +121,7 @@ impl<'a> FourierBasis<'a> {
             });
         }
         let right = sums.iter().map(|sum| sum.iter().sum());
-        self.normal
-            .solve(&DVector::from_iterator(sums.len(), right))
+        self.normal.solve(&DVector::from_iterator(sums.len(), right))
     }
 
     /// Angle of the first harmonic at a time, rad.
@@ -276,22 +274,14 @@ pub(crate) fn find_series(time: &[f64], signals: &[&[f64]]) -> Option<PeriodicSe
 
 /// Whether a signal could continue at its end with its start: the difference is at most a few of its steps.
 fn is_closed(values: &[f64]) -> bool {
-    let largest = values
-        .windows(2)
-        .map(|w| (w[1] - w[0]).abs())
-        .fold(0.0, f64::max);
+    let largest = values.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     (values[values.len() - 1] - values[0]).abs() <= SERIES_CLOSED_STEPS * largest
 }
 
 /// The period near the given one, and the number of significant harmonics; `None` if their residual is not noise.
 ///
 /// `longest` is the upper limit of the period, s.
-fn refine_series(
-    time: &[f64],
-    signals: &[&[f64]],
-    mut period: f64,
-    longest: f64,
-) -> Option<(f64, usize)> {
+fn refine_series(time: &[f64], signals: &[&[f64]], mut period: f64, longest: f64) -> Option<(f64, usize)> {
     let n = time.len();
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
     let most = float_to_count(SERIES_HIGHEST_SHARE * period / step).min(SERIES_MOST_HARMONICS);
@@ -303,8 +293,7 @@ fn refine_series(
         let signals: Vec<&[f64]> = signals.iter().map(|values| &values[..samples]).collect();
         let mut period = period;
         for _ in 0..4 {
-            let change =
-                FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
+            let change = FourierBasis::new(&time[..samples], period, harmonics)?.period_step(&signals)?;
             period = (period + change.clamp(-step, step)).clamp(2.0 * step, longest);
             if change.abs() < CONVERGENCE_TOLERANCE * step {
                 break;
@@ -339,12 +328,7 @@ fn refine_series(
 
 /// The last harmonic above the noise in any signal. `None` if the residual of all harmonics is not white noise, or if
 /// none is significant.
-fn last_significant_harmonic(
-    time: &[f64],
-    signals: &[&[f64]],
-    period: f64,
-    most: usize,
-) -> Option<usize> {
+fn last_significant_harmonic(time: &[f64], signals: &[&[f64]], period: f64, most: usize) -> Option<usize> {
     let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     let basis = FourierBasis::new(time, period, most)?;
     let mut harmonics = 0;
@@ -356,9 +340,7 @@ fn last_significant_harmonic(
         let variance = variance * time.len() as f64 / (time.len() - 2 * most - 1) as f64;
         // Mean square of the amplitude of a line that white noise causes.
         let average = 4.0 * variance / time.len() as f64;
-        let stands_out = |k: &usize| {
-            series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average
-        };
+        let stands_out = |k: &usize| series[2 * k - 1].powi(2) + series[2 * k].powi(2) > MIN_LINE_POWER_RATIO * average;
         harmonics = harmonics.max((1..=most).rev().find(stands_out).unwrap_or(0));
     }
     (harmonics > 0).then_some(harmonics)
@@ -439,11 +421,7 @@ mod tests {
         let basis = FourierBasis::new(&time, PERIOD, 3).expect("two thirds of a period");
         let rows = DMatrix::from_fn(time.len(), 7, |i, j| {
             let angle = TAU * j.div_ceil(2) as f64 * (time[i] - time[0]) / PERIOD;
-            if j % 2 == 0 && j > 0 {
-                angle.sin()
-            } else {
-                angle.cos()
-            }
+            if j % 2 == 0 && j > 0 { angle.sin() } else { angle.cos() }
         });
         let factor = basis.normal.l();
         let difference = &factor * factor.transpose() - rows.transpose() * &rows;

@@ -63,22 +63,15 @@ impl RecordedCoordinate<'_> {
         // A constant coordinate has rates of zero. Filters would leave rounding errors, whose sign would be friction.
         if is_constant(self.q) && self.qd.is_none_or(is_constant) {
             let zero = vec![0.0; time.len()];
-            let recorded =
-                |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
-            return Ok(Some([
-                self.q.to_vec(),
-                recorded(self.qd),
-                recorded(self.qdd),
-            ]));
+            let recorded = |values: Option<&[f64]>| values.map_or_else(|| zero.clone(), <[f64]>::to_vec);
+            return Ok(Some([self.q.to_vec(), recorded(self.qd), recorded(self.qdd)]));
         }
         // The selected filter on one column.
         let smooth = |values: &[f64]| match way {
-            SmoothingFilter::Butterworth { order } => {
-                smooth_at_true_times(time, values, cutoff, order).map(Some)
+            SmoothingFilter::Butterworth { order } => smooth_at_true_times(time, values, cutoff, order).map(Some),
+            SmoothingFilter::Polynomials { half_width } => {
+                Ok(local_polynomials::smooth_by_polynomials(time, values, half_width))
             }
-            SmoothingFilter::Polynomials { half_width } => Ok(
-                local_polynomials::smooth_by_polynomials(time, values, half_width),
-            ),
             SmoothingFilter::Series { period, harmonics } => {
                 Ok(series::project_on_series(time, values, period, harmonics))
             }
@@ -141,15 +134,11 @@ pub(crate) enum SmoothingFilter {
 impl SmoothingFilter {
     /// Description for notes; `is_chosen` states whether the cut-off was chosen from the signal.
     pub(crate) fn describe(self, cutoff: f64, is_chosen: bool) -> String {
-        let chosen = if is_chosen {
-            " (chosen from the signal)"
-        } else {
-            ""
-        };
+        let chosen = if is_chosen { " (chosen from the signal)" } else { "" };
         match self {
-            Self::Butterworth { order } => format!(
-                "Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences"
-            ),
+            Self::Butterworth { order } => {
+                format!("Butterworth of order {order} at {cutoff:.4} Hz{chosen}, zero phase, then central differences")
+            }
             Self::Polynomials { half_width } => format!(
                 "polynomials of degree {} over {} samples each (Savitzky-Golay), which corresponds to a cut-off of \
                  {cutoff:.4} Hz{chosen}",

@@ -255,19 +255,13 @@ impl RecordingFault {
     #[allow(clippy::too_many_lines, reason = "one arm per fault, each a sentence")]
     pub fn message(&self) -> Message {
         // The option that maps a name of the model to a column of the file.
-        let map = |ours: &str, theirs: &str| {
-            OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"))
-        };
+        let map = |ours: &str, theirs: &str| OptionSetting::new(OptionName::Columns, format!("{ours}={theirs}"));
         match self {
-            Self::Unreadable { reason } => message!(
-                "the recording cannot be read: {reason}; check the path and the permissions"
-            ),
-            Self::Empty => {
-                "the recording is empty; a header line and one line per sample are expected".into()
+            Self::Unreadable { reason } => {
+                message!("the recording cannot be read: {reason}; check the path and the permissions")
             }
-            Self::NoSamples => {
-                "there is a header but no sample; one line of numbers per sample is expected".into()
-            }
+            Self::Empty => "the recording is empty; a header line and one line per sample are expected".into(),
+            Self::NoSamples => "there is a header but no sample; one line of numbers per sample is expected".into(),
             Self::NotCsv { looks_like } => message!(
                 "this looks like {looks_like}, not like a recording; save it as CSV (UTF-8, with a header), Parquet, HDF5, MCAP or a MATLAB file"
             ),
@@ -320,9 +314,9 @@ impl RecordingFault {
                 "the separator of the columns is not clear in `{header}`; \
                  use a comma (or `;` or a tab) throughout and a point for decimals"
             ),
-            Self::UnnamedColumn { place } => message!(
-                "column {place} has no name; name it, or remove a separator at the end of the lines"
-            ),
+            Self::UnnamedColumn { place } => {
+                message!("column {place} has no name; name it, or remove a separator at the end of the lines")
+            }
             Self::DuplicateColumn {
                 name,
                 places: [a, b],
@@ -361,16 +355,10 @@ impl RecordingFault {
                     None => ".".to_owned(),
                 };
                 let how = if *by_renaming {
-                    message!(
-                        "Renamings read {}.",
-                        Remedy::options([map("ours", "theirs")])
-                    )
+                    message!("Renamings read {}.", Remedy::options([map("ours", "theirs")]))
                 } else {
                     let theirs = nearest.as_deref().unwrap_or("THEIRS");
-                    message!(
-                        "Map one onto it with {}.",
-                        Remedy::options([map(name, theirs)])
-                    )
+                    message!("Map one onto it with {}.", Remedy::options([map(name, theirs)]))
                 };
                 message!("{missing}{meant}{} {}", columns_there(present), how)
             }
@@ -393,10 +381,7 @@ impl RecordingFault {
                 )
             }
             Self::NotANumber {
-                column,
-                text,
-                count,
-                ..
+                column, text, count, ..
             } => {
                 let write_other_count = write_other_count(*count, "fields of the column are not numbers");
                 // A comma between two integers is most likely a decimal comma.
@@ -405,15 +390,10 @@ impl RecordingFault {
                 } else {
                     "correct or remove it"
                 };
-                message!(
-                    "column `{column}` contains `{text}` where a number is expected{write_other_count}; {what}"
-                )
+                message!("column `{column}` contains `{text}` where a number is expected{write_other_count}; {what}")
             }
             Self::NotFinite {
-                column,
-                text,
-                count,
-                ..
+                column, text, count, ..
             } => {
                 // Finite numbers get here only if they are too large to be measurements.
                 let holds = if text.is_empty() {
@@ -435,20 +415,13 @@ impl RecordingFault {
                 "the measured force of {} is needed, but there is no such column; \
                  map one onto it with {}",
                 backquoted_list(drives),
-                Remedy::options([map(
-                    drives.first().map_or("DRIVE", String::as_str),
-                    "THEIRS"
-                )])
+                Remedy::options([map(drives.first().map_or("DRIVE", String::as_str), "THEIRS")])
             ),
             Self::TimeNotIncreasing { previous, here, .. } => message!(
                 "time goes from {previous} s to {here} s, but must increase from sample to sample; \
                  remove repeated samples, or split the file where the clock was reset"
             ),
-            Self::TooFewSamples {
-                have,
-                need,
-                purpose,
-            } => message!(
+            Self::TooFewSamples { have, need, purpose } => message!(
                 "{} too few for {}, which takes at least {need}; use a longer recording",
                 match have {
                     1 => "1 sample is".to_owned(),
@@ -500,9 +473,7 @@ impl fmt::Display for RecordingFault {
 fn columns_there(present: &[String]) -> String {
     let mut says = format!(" The columns are: {}.", backquoted_list(present));
     if present.first().is_some_and(|first| first.starts_with('#')) {
-        says.push_str(
-            " The first line must name the columns: comment lines are not read, delete them.",
-        );
+        says.push_str(" The first line must name the columns: comment lines are not read, delete them.");
     }
     says
 }

@@ -9,9 +9,7 @@ use std::sync::Arc;
 use modelmill_boundary::files::{FileSource, OpenFile};
 
 use crate::recording::error::{RecordingError, RecordingFault};
-use crate::recording::formats::{
-    LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of,
-};
+use crate::recording::formats::{LONGEST_STREAM, RecordingFormat, RecordingInput, SIGNATURE_BYTES, format_of};
 use crate::recording::table::{self, MemoryTable};
 use crate::recording::{ReadOptions, SignalRecording, TableInfo, display_name_of_bytes};
 
@@ -63,10 +61,7 @@ impl RecordingFile {
     }
 
     /// Makes a recording of columns in memory; `name` is its name in messages. Fails when columns differ in length.
-    pub fn from_table(
-        name: &str,
-        columns: Vec<(String, Vec<f64>)>,
-    ) -> Result<Self, RecordingError> {
+    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
         let name = format!("{name}{}", table::SUFFIX);
         match MemoryTable::new(columns) {
             Ok(table) => Ok(Self {
@@ -84,10 +79,7 @@ impl RecordingFile {
 
     /// The names of its columns as in the file. Fails when the file cannot be read.
     pub fn names(&self) -> Result<Vec<String>, RecordingError> {
-        self.dispatch_to_source(
-            |format, input| format.names(input),
-            |table| Ok(table.names()),
-        )
+        self.dispatch_to_source(|format, input| format.names(input), |table| Ok(table.names()))
     }
 
     /// Its tables or topics with their columns. Fails when the file cannot be read.
@@ -114,9 +106,7 @@ impl RecordingFile {
     ) -> Result<T, RecordingError> {
         let answer = match &self.source {
             RecordingSource::Table(table) => of_table(table),
-            RecordingSource::Memory(format, bytes) => {
-                of_format(*format, RecordingInput::Bytes(bytes))
-            }
+            RecordingSource::Memory(format, bytes) => of_format(*format, RecordingInput::Bytes(bytes)),
             // The handle is shared, so the position must be reset before each read.
             RecordingSource::File(format, file) => {
                 let rewound = file.try_clone().and_then(|mut file| {

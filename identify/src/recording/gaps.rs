@@ -15,9 +15,9 @@ impl SignalRecording {
         let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
         // Sample indices at which segments start, with both ends of the recording.
         let mut edges = vec![0];
-        edges.extend((1..time.len()).filter(|i| {
-            time[*i] - time[*i - 1] > (GAP_LEAST_STEPS * usual).max(bridged) && usual > 0.0
-        }));
+        edges.extend(
+            (1..time.len()).filter(|i| time[*i] - time[*i - 1] > (GAP_LEAST_STEPS * usual).max(bridged) && usual > 0.0),
+        );
         edges.push(time.len());
         if edges.len() == 2 {
             return vec![self.clone()];

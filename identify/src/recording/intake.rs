@@ -52,10 +52,7 @@ pub(crate) struct SampleIntake<'a> {
 impl<'a> SampleIntake<'a> {
     /// Prepares for samples of columns that the file calls `theirs`. Fails when names are missing or duplicate, or
     /// when a renaming or computed column refers to a column that does not exist.
-    pub(crate) fn new(
-        theirs: Vec<String>,
-        options: &'a ReadOptions,
-    ) -> Result<Self, RecordingFault> {
+    pub(crate) fn new(theirs: Vec<String>, options: &'a ReadOptions) -> Result<Self, RecordingFault> {
         check_names(&theirs)?;
         let place = |name: &String| {
             let place = theirs.iter().position(|other| other == name);
@@ -105,19 +102,13 @@ impl<'a> SampleIntake<'a> {
             None => None,
             Some(_) => match options.computed.iter().find(|one| one.name == "t") {
                 Some(ComputedColumn { terms, offset, .. }) => {
-                    let terms = terms
-                        .iter()
-                        .map(|(name, factor)| Ok((place(name)?, *factor)));
+                    let terms = terms.iter().map(|(name, factor)| Ok((place(name)?, *factor)));
                     Some((terms.collect::<Result<Vec<_>, RecordingFault>>()?, *offset))
                 }
                 None => match names.iter().position(|name| name == "t") {
                     Some(place) => Some((vec![(place, 1.0)], 0.0)),
                     None => {
-                        return Err(missing_column_fault(
-                            "t",
-                            names.iter().map(String::as_str),
-                            false,
-                        ));
+                        return Err(missing_column_fault("t", names.iter().map(String::as_str), false));
                     }
                 },
             },
@@ -224,10 +215,7 @@ impl<'a> SampleIntake<'a> {
     pub(crate) fn finish(self, file: &str) -> Result<SignalRecording, RecordingFault> {
         // An empty result has another cause if a time interval was requested.
         if self.lines.is_empty() {
-            if let (Some((from, to)), true) = (
-                self.options.time_interval,
-                self.before > 0 || self.stopped.is_some(),
-            ) {
+            if let (Some((from, to)), true) = (self.options.time_interval, self.before > 0 || self.stopped.is_some()) {
                 return Err(RecordingFault::NoSamplesInInterval { from, to });
             }
             return Err(RecordingFault::NoSamples);
@@ -257,10 +245,7 @@ impl<'a> SampleIntake<'a> {
         // Computed columns come from the kept columns, before these are sorted by whether they are wanted.
         let mut computed = IndexMap::new();
         for one in &self.options.computed {
-            computed.insert(
-                one.name.clone(),
-                compute_column(one, &self.theirs, &self.columns),
-            );
+            computed.insert(one.name.clone(), compute_column(one, &self.theirs, &self.columns));
         }
         let wanted = self.options.wanted.as_ref();
         let mut columns = IndexMap::new();
@@ -303,11 +288,7 @@ fn is_time_place(time: Option<&(Vec<(usize, f64)>, f64)>, place: usize) -> bool 
 }
 
 /// A computed column: `offset + sum of factor * column`. Defects of any term are defects of the sum.
-fn compute_column(
-    computed: &ComputedColumn,
-    theirs: &[String],
-    columns: &[SignalColumn],
-) -> SignalColumn {
+fn compute_column(computed: &ComputedColumn, theirs: &[String], columns: &[SignalColumn]) -> SignalColumn {
     let mut sum = SignalColumn::default();
     for (name, factor) in &computed.terms {
         let Some(place) = theirs.iter().position(|other| other == name) else {
@@ -365,11 +346,7 @@ fn rename(names: &[String], renames: &[(String, String)]) -> Result<Vec<String>,
         match names.iter().position(|name| name == theirs) {
             Some(place) => renamed[place].clone_from(ours),
             None => {
-                return Err(missing_column_fault(
-                    theirs,
-                    names.iter().map(String::as_str),
-                    true,
-                ));
+                return Err(missing_column_fault(theirs, names.iter().map(String::as_str), true));
             }
         }
     }

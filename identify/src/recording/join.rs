@@ -59,10 +59,7 @@ pub(crate) fn join_parts(
         .max_by_key(|i| parts[*i].columns.len())
         .unwrap_or(0);
     let base_step = steps[base];
-    let others_steps: Vec<f64> = (0..steps.len())
-        .filter(|i| *i != base)
-        .map(|i| steps[i])
-        .collect();
+    let others_steps: Vec<f64> = (0..steps.len()).filter(|i| *i != base).map(|i| steps[i]).collect();
     let names: Vec<String> = parts.iter().map(|part| part.name.clone()).collect();
     let base = parts.remove(base);
     let n = base.time.len();
@@ -86,9 +83,7 @@ pub(crate) fn join_parts(
         for (place, values) in part.columns {
             // The first sample of the pair, plus the share of the way to the second one.
             let value = |around: &Option<(usize, f64)>| match around {
-                Some((k, share)) if *share != 0.0 => {
-                    values[*k] + share * (values[k + 1] - values[*k])
-                }
+                Some((k, share)) if *share != 0.0 => values[*k] + share * (values[k + 1] - values[*k]),
                 Some((k, _)) => values[*k],
                 None => f64::NAN,
             };
@@ -119,10 +114,7 @@ pub(crate) fn join_parts(
     // Remove the rows that are left out from all columns.
     let kept = |values: Vec<f64>| -> Vec<f64> {
         let pairs = values.into_iter().zip(&is_covered);
-        pairs
-            .filter(|(_, covered)| **covered)
-            .map(|(value, _)| value)
-            .collect()
+        pairs.filter(|(_, covered)| **covered).map(|(value, _)| value).collect()
     };
     Ok(Some(JoinedColumns {
         time: kept(base.time),

@@ -11,6 +11,7 @@ mod formats;
 mod gaps;
 mod intake;
 mod join;
+mod joined_files;
 pub(crate) mod notes;
 mod options;
 mod read;
@@ -18,18 +19,17 @@ mod repair;
 mod table;
 mod tables;
 mod thresholds;
-mod together;
 
 use indexmap::IndexMap;
 
 use crate::words::nearest_name;
 pub use error::{RecordingError, RecordingFault};
 pub use file::RecordingFile;
+pub use joined_files::RecordingFiles;
 pub use notes::{NoteSeverity, RecordingNote};
 pub use options::{ComputedColumn, NonFinitePolicy, ReadOptions};
 pub use read::{display_name_of_bytes, has_recording_extension, sample_place_word};
 pub use tables::{ColumnInfo, TableInfo};
-pub use together::RecordingFiles;
 
 use column::{ColumnDefect, SignalColumn, missing_column_fault};
 pub(crate) use thresholds::GAP_LEAST_STEPS;
@@ -115,17 +115,11 @@ impl SignalRecording {
     }
 
     /// The numbers of a column, as [`Self::column`]. Columns named in `wanted` are not suggested for a missing one.
-    pub(crate) fn column_without_suggesting(
-        &self,
-        name: &str,
-        wanted: &[String],
-    ) -> Result<&[f64], RecordingError> {
+    pub(crate) fn column_without_suggesting(&self, name: &str, wanted: &[String]) -> Result<&[f64], RecordingError> {
         if self.has_column(name) {
             return self.column(name);
         }
-        let others = self
-            .names()
-            .filter(|name| !wanted.iter().any(|w| w == name));
+        let others = self.names().filter(|name| !wanted.iter().any(|w| w == name));
         let proposed = nearest_name(name, others).map(str::to_owned);
         let mut fault = missing_column_fault(name, self.names(), false);
         if let RecordingFault::MissingColumn { nearest, .. } = &mut fault {
@@ -136,23 +130,13 @@ impl SignalRecording {
 
     /// Fails when more than one of the columns `needed` does not exist, and reports all of them at once. Columns
     /// named in `wanted` are not suggested, and no column is suggested twice.
-    pub(crate) fn check_columns(
-        &self,
-        needed: &[String],
-        wanted: &[String],
-    ) -> Result<(), RecordingError> {
-        let missing: Vec<&String> = needed
-            .iter()
-            .filter(|name| !self.has_column(name))
-            .collect();
+    pub(crate) fn check_columns(&self, needed: &[String], wanted: &[String]) -> Result<(), RecordingError> {
+        let missing: Vec<&String> = needed.iter().filter(|name| !self.has_column(name)).collect();
         // A single missing column has its own fault.
         if missing.len() < 2 {
             return Ok(());
         }
-        let mut others: Vec<&str> = self
-            .names()
-            .filter(|name| !wanted.iter().any(|w| w == name))
-            .collect();
+        let mut others: Vec<&str> = self.names().filter(|name| !wanted.iter().any(|w| w == name)).collect();
         let missing = missing.into_iter().map(|name| {
             let found = nearest_name(name, others.iter().copied()).map(str::to_owned);
             others.retain(|other| Some(*other) != found.as_deref());

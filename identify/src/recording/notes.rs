@@ -56,10 +56,7 @@ impl RecordingNote {
 }
 
 /// Writes notes with remedies spelled for the library. A fit that no front end has printed keeps them in this form.
-pub(crate) fn serialize<S: Serializer>(
-    notes: &[RecordingNote],
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub(crate) fn serialize<S: Serializer>(notes: &[RecordingNote], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(notes.iter().map(|note| SpelledNote {
         severity: note.severity,
         says: note.says.in_library_words(),
@@ -67,9 +64,7 @@ pub(crate) fn serialize<S: Serializer>(
 }
 
 /// Reads notes, whose texts are plain then.
-pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Vec<RecordingNote>, D::Error> {
+pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<RecordingNote>, D::Error> {
     let notes = Vec::<SpelledNote>::deserialize(deserializer)?.into_iter();
     let note = |one: SpelledNote| RecordingNote {
         severity: one.severity,

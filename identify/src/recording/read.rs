@@ -32,10 +32,7 @@ impl SignalRecording {
     }
 
     /// [`SignalRecording::read`] with all options.
-    pub fn read_with(
-        path: impl AsRef<Path>,
-        options: &ReadOptions,
-    ) -> Result<Self, RecordingError> {
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, RecordingError> {
         RecordingFile::open(&DiskFiles::default(), path.as_ref())?.read(options)
     }
 
@@ -45,11 +42,7 @@ impl SignalRecording {
     }
 
     /// [`SignalRecording::read_with`] for a file in memory; `file` is its name in messages.
-    pub fn from_bytes(
-        bytes: &[u8],
-        file: &str,
-        options: &ReadOptions,
-    ) -> Result<Self, RecordingError> {
+    pub fn from_bytes(bytes: &[u8], file: &str, options: &ReadOptions) -> Result<Self, RecordingError> {
         let recording = format_of(bytes).read(RecordingInput::Bytes(bytes), file, options);
         recording.map_err(|fault| RecordingError {
             file: file.to_owned(),
@@ -75,11 +68,7 @@ impl SignalRecording {
     /// assert_eq!(recording.column("theta1")?, [1.5, 1.6]);
     /// # Ok::<(), modelmill_identify::RecordingError>(())
     /// ```
-    pub fn from_reader(
-        stream: impl Read,
-        file: &str,
-        options: &ReadOptions,
-    ) -> Result<Self, RecordingError> {
+    pub fn from_reader(stream: impl Read, file: &str, options: &ReadOptions) -> Result<Self, RecordingError> {
         let text = format_of(b"").read(RecordingInput::Stream(Box::new(stream)), file, options);
         text.map_err(|fault| RecordingError {
             file: file.to_owned(),
@@ -96,9 +85,7 @@ pub fn display_name_of_bytes(name: &str, bytes: &[u8]) -> String {
 
 /// Whether a file has the extension of a supported format; case does not matter.
 pub fn has_recording_extension(path: &Path) -> bool {
-    let mut endings = FORMATS
-        .into_iter()
-        .flat_map(<dyn RecordingFormat>::extensions);
+    let mut endings = FORMATS.into_iter().flat_map(<dyn RecordingFormat>::extensions);
     path.extension()
         .is_some_and(|extension| endings.any(|ending| extension.eq_ignore_ascii_case(ending)))
 }

@@ -5,9 +5,9 @@
 use crate::recording::column::SignalColumn;
 use crate::recording::read::sample_place_word;
 use crate::recording::thresholds::{
-    JUMP_FEWEST_NEIGHBOURS, JUMP_GAP_STEPS, JUMP_LONGEST_STEP, JUMPS_LEAST_ALLOWED,
-    JUMPS_MOST_SHARE, MIN_JUMP_RATIO, REPAIR_NEIGHBOURHOODS, SPIKE_MOST_SAMPLES,
-    SPIKE_NOISE_SIGMAS, SPIKE_RANGE_SHARE, SPIKES_MOST_SHARE, TURN_TOLERANCE, ZERO_SHIFT_SHARE,
+    JUMP_FEWEST_NEIGHBOURS, JUMP_GAP_STEPS, JUMP_LONGEST_STEP, JUMPS_LEAST_ALLOWED, JUMPS_MOST_SHARE, MIN_JUMP_RATIO,
+    REPAIR_NEIGHBOURHOODS, SPIKE_MOST_SAMPLES, SPIKE_NOISE_SIGMAS, SPIKE_RANGE_SHARE, SPIKES_MOST_SHARE,
+    TURN_TOLERANCE, ZERO_SHIFT_SHARE,
 };
 use crate::recording::{RecordingNote, SignalRecording};
 use crate::signal::{median, white_noise};
@@ -171,9 +171,7 @@ impl SignalColumn {
     ///
     /// Before the first and behind the last measured sample the nearest value is used.
     fn interpolate_lost(&mut self) {
-        let sound: Vec<usize> = (0..self.values.len())
-            .filter(|i| !self.interpolated[*i])
-            .collect();
+        let sound: Vec<usize> = (0..self.values.len()).filter(|i| !self.interpolated[*i]).collect();
         let (Some(first), Some(last)) = (sound.first().copied(), sound.last().copied()) else {
             return;
         };
@@ -204,9 +202,7 @@ fn find_spikes(force: &[f64], is_made: &dyn Fn(usize) -> bool) -> Option<(Vec<bo
         return None;
     }
     // Deviation of each sample from the median of its neighbours.
-    let off: Vec<f64> = (0..n)
-        .map(|i| force[i] - neighbour_median(force, i))
-        .collect();
+    let off: Vec<f64> = (0..n).map(|i| force[i] - neighbour_median(force, i)).collect();
     // 1.4826 times the median absolute deviation is the standard deviation of normal noise.
     let noise = 1.4826 * median(off.iter().map(|x| x.abs()).collect());
     // The range of the force without the outer percent on each side.
@@ -263,9 +259,7 @@ fn excess_over_neighbours(values: &[f64], i: usize) -> f64 {
     let before = &values[i.saturating_sub(NEIGHBOURS)..i];
     let behind = &values[i + 1..(i + 1 + NEIGHBOURS).min(values.len())];
     // A side with few samples at an end of the recording may consist of spikes only, so it is ignored.
-    let sides = [before, behind]
-        .into_iter()
-        .filter(|side| side.len() == NEIGHBOURS);
+    let sides = [before, behind].into_iter().filter(|side| side.len() == NEIGHBOURS);
     let off = sides.map(|side| (values[i] - median(side.to_vec())).abs());
     off.fold(f64::INFINITY, f64::min)
 }
@@ -278,9 +272,7 @@ fn rate_neighbours(gaps: &[usize], k: usize, n: usize) -> Option<(usize, usize)>
     if gaps.get(next) == Some(&k) {
         return None;
     }
-    let before = next
-        .checked_sub(1)
-        .map_or(NEIGHBOURS, |at| k - gaps[at] - 1);
+    let before = next.checked_sub(1).map_or(NEIGHBOURS, |at| k - gaps[at] - 1);
     let behind = gaps.get(next).map_or(NEIGHBOURS, |gap| gap - k - 1);
     let reach = before.min(behind).min(NEIGHBOURS);
     (reach >= JUMP_FEWEST_NEIGHBOURS).then(|| (k.saturating_sub(reach), (k + reach + 1).min(n)))
@@ -296,9 +288,7 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
     }
     // Rates of all steps, the median step of time, and the steps that are gaps.
     let usual = median(time.windows(2).map(|w| w[1] - w[0]).collect());
-    let rates: Vec<f64> = (1..n)
-        .map(|i| (q[i] - q[i - 1]) / (time[i] - time[i - 1]))
-        .collect();
+    let rates: Vec<f64> = (1..n).map(|i| (q[i] - q[i - 1]) / (time[i] - time[i - 1])).collect();
     let is_short = |i: usize| time[i] - time[i - 1] < JUMP_LONGEST_STEP * usual;
     let cuts: Vec<usize> = (1..n)
         .filter(|i| time[*i] - time[i - 1] > JUMP_GAP_STEPS * usual)
@@ -323,11 +313,7 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
         return Vec::new();
     };
     // The resolution of the encoder is not a jump.
-    let step = sizes
-        .iter()
-        .copied()
-        .find(|size| *size > 0.0)
-        .unwrap_or(0.0);
+    let step = sizes.iter().copied().find(|size| *size > 0.0).unwrap_or(0.0);
     let bound = MIN_JUMP_RATIO * largest.max(step);
     // A wrapped angle steps by one turn, in rad or degrees.
     let turns = [std::f64::consts::TAU, 360.0];
@@ -349,9 +335,7 @@ fn find_jumps(time: &[f64], q: &[f64]) -> Vec<(usize, f64)> {
         let before = (0..k).rev().find(|j| !is_jump[*j]);
         let behind = (k + 1..n - 1).find(|j| !is_jump[*j]);
         let likely = match (before, behind) {
-            (Some(a), Some(b)) => {
-                rates[a] + (rates[b] - rates[a]) * (k - a) as f64 / (b - a) as f64
-            }
+            (Some(a), Some(b)) => rates[a] + (rates[b] - rates[a]) * (k - a) as f64 / (b - a) as f64,
             (one, other) => one.or(other).map_or(0.0, |j| rates[j]),
         };
         (k + 1, (rates[k] - likely) * (time[k + 1] - time[k]))
@@ -404,8 +388,7 @@ mod tests {
     }
 
     fn force(i: u32) -> f64 {
-        20.0 * (7.0 * f64::from(i) * 0.002).cos()
-            + 4.0 * (3.0 * f64::from(i) * 0.002).cos().signum()
+        20.0 * (7.0 * f64::from(i) * 0.002).cos() + 4.0 * (3.0 * f64::from(i) * 0.002).cos().signum()
     }
 
     #[test]
@@ -439,8 +422,7 @@ mod tests {
             let t = f64::from(i) * 0.002;
             let _ = writeln!(text, "{t},{},{}", (3.0 * t).sin(), (7.0 * t).cos());
         }
-        let read =
-            SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default());
+        let read = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default());
         let mut recording = read.unwrap();
         let before = recording.column("q").unwrap().to_vec();
         let (coordinates, drives) = (["q".to_owned()], ["motor".to_owned()]);
@@ -469,10 +451,7 @@ mod tests {
         let says: Vec<String> = says.collect();
         assert_eq!(says.len(), 2, "{says:?}");
         assert!(says[0].contains("2 of 1000 samples") && says[0].contains("line 302"));
-        assert!(
-            says[1].contains("1 spike") && says[1].contains("1000000"),
-            "{says:?}"
-        );
+        assert!(says[1].contains("1 spike") && says[1].contains("1000000"), "{says:?}");
     }
 
     /// A logger that starts with garbage: its first sample has nothing before it, its second has only the first.
@@ -485,13 +464,7 @@ mod tests {
         let lost = found.lost_samples("motor").unwrap();
         let at: Vec<usize> = (0..1000).filter(|i| lost[*i]).collect();
         assert_eq!(at, [0, 1, 998, 999]);
-        assert!(
-            found
-                .column("motor")
-                .unwrap()
-                .iter()
-                .all(|f| f.abs() < 30.0)
-        );
+        assert!(found.column("motor").unwrap().iter().all(|f| f.abs() < 30.0));
     }
 
     #[test]

@@ -35,11 +35,7 @@ impl MemoryTable {
     }
 
     /// Reads it as [`SignalRecording::read`] reads a file, with the same faults.
-    pub(crate) fn read(
-        &self,
-        file: &str,
-        options: &ReadOptions,
-    ) -> Result<SignalRecording, RecordingFault> {
+    pub(crate) fn read(&self, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
         // Each row becomes a sample; columns that are not needed are skipped by the intake.
         let mut intake = SampleIntake::new(self.names(), options)?;
         let samples = self.0.first().map_or(0, |(_, values)| values.len());
@@ -65,9 +61,7 @@ impl MemoryTable {
     pub(crate) fn table_info(&self) -> TableInfo {
         let names = self.names();
         TableInfo {
-            time: find_time_range(&names, |name| {
-                self.read("", &ReadOptions::single_column(name)).ok()
-            }),
+            time: find_time_range(&names, |name| self.read("", &ReadOptions::single_column(name)).ok()),
             columns: names
                 .into_iter()
                 .map(|name| ColumnInfo {

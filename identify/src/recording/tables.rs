@@ -38,16 +38,7 @@ impl TableInfo {
 }
 
 /// Usual names of the time, in lower case, the most likely first.
-const TIME_NAMES: [&str; 8] = [
-    "t",
-    "time",
-    "t_s",
-    "time_s",
-    "timestamp",
-    "stamp",
-    "seconds",
-    "sec",
-];
+const TIME_NAMES: [&str; 8] = ["t", "time", "t_s", "time_s", "timestamp", "stamp", "seconds", "sec"];
 
 /// The column that is most likely the time, by its name behind the last point.
 pub(crate) fn likely_time_column(names: &[String]) -> Option<&String> {

@@ -144,12 +144,7 @@ impl LowPass {
     /// Chebyshev's filter of the first kind: `ripple_db` of ripple up to `cutoff_hz`, and steeper
     /// beyond it than Butterworth's.
     /// Fails as [`LowPass::butterworth`] does; `ripple_db` must be positive.
-    pub fn chebyshev1(
-        order: usize,
-        ripple_db: f64,
-        cutoff_hz: f64,
-        rate_hz: f64,
-    ) -> Result<Self, FilterError> {
+    pub fn chebyshev1(order: usize, ripple_db: f64, cutoff_hz: f64, rate_hz: f64) -> Result<Self, FilterError> {
         check_order(order)?;
         let warped = warp(cutoff_hz, rate_hz)?;
         let epsilon = (10.0_f64.powf(ripple_db / 10.0) - 1.0).sqrt();
@@ -157,10 +152,7 @@ impl LowPass {
         // Poles lie on an ellipse.
         let poles = (0..order.div_ceil(2)).map(|k| {
             let angle = PI * (2 * k + 1) as f64 / (2 * order) as f64;
-            (
-                -mu.sinh() * angle.sin() * warped,
-                mu.cosh() * angle.cos() * warped,
-            )
+            (-mu.sinh() * angle.sin() * warped, mu.cosh() * angle.cos() * warped)
         });
         // At frequency zero an even order has the lowest gain of the ripple.
         let dc = if order.is_multiple_of(2) {
@@ -173,11 +165,7 @@ impl LowPass {
 
     /// Sections from the analogue poles `(re, im >= 0)`, one of each conjugate pair, by the
     /// bilinear transform `s = (z - 1)/(z + 1)`; all zeros lie at `z = -1`.
-    fn from_upper_poles(
-        order: usize,
-        poles: impl Iterator<Item = (f64, f64)>,
-        dc_gain: f64,
-    ) -> Self {
+    fn from_upper_poles(order: usize, poles: impl Iterator<Item = (f64, f64)>, dc_gain: f64) -> Self {
         let mut sections: Vec<SecondOrderSection> = poles
             .enumerate()
             .map(|(k, (re, im))| {
@@ -221,8 +209,7 @@ impl LowPass {
     pub fn gain(&self, frequency_hz: f64, rate_hz: f64) -> f64 {
         let (sin1, cos1) = (2.0 * PI * frequency_hz / rate_hz).sin_cos();
         let (sin2, cos2) = (4.0 * PI * frequency_hz / rate_hz).sin_cos();
-        let magnitude =
-            |c0: f64, c1: f64, c2: f64| (c0 + c1 * cos1 + c2 * cos2).hypot(c1 * sin1 + c2 * sin2);
+        let magnitude = |c0: f64, c1: f64, c2: f64| (c0 + c1 * cos1 + c2 * cos2).hypot(c1 * sin1 + c2 * sin2);
         self.sections
             .iter()
             .map(|s| magnitude(s.b[0], s.b[1], s.b[2]) / magnitude(1.0, s.a[0], s.a[1]))
@@ -240,21 +227,14 @@ impl LowPass {
 
     /// The same for several signals at a time. A recursion waits for its last result, and the other signals use that
     /// time. Every lane gives the same bits as it would alone.
-    pub(crate) fn zero_phase_lanes<const N: usize>(
-        &self,
-        signal: &[[f64; N]],
-    ) -> Result<Vec<[f64; N]>, FilterError> {
+    pub(crate) fn zero_phase_lanes<const N: usize>(&self, signal: &[[f64; N]]) -> Result<Vec<[f64; N]>, FilterError> {
         let pad = self.padding();
         let n = signal.len();
         if n <= pad {
-            return Err(FilterError::TooShort {
-                have: n,
-                need: pad + 1,
-            });
+            return Err(FilterError::TooShort { have: n, need: pad + 1 });
         }
         // Both ends are continued by point reflection at the first and last sample.
-        let mirrored =
-            |about: usize, i: usize| array::from_fn(|k| 2.0 * signal[about][k] - signal[i][k]);
+        let mirrored = |about: usize, i: usize| array::from_fn(|k| 2.0 * signal[about][k] - signal[i][k]);
         let mut extended: Vec<[f64; N]> = Vec::with_capacity(n + 2 * pad);
         extended.extend((1..=pad).rev().map(|i| mirrored(0, i)));
         extended.extend_from_slice(signal);
@@ -303,11 +283,7 @@ impl<const N: usize> WithSimd for SteadyStateFilter<'_, N> {
         // Each section starts in the steady state for the output of the sections before it.
         let mut states: Vec<[[f64; N]; 2]> = Vec::with_capacity(self.sections.len());
         for section in self.sections {
-            states.push(
-                section
-                    .steady_state()
-                    .map(|state| level.map(|level| state * level)),
-            );
+            states.push(section.steady_state().map(|state| level.map(|level| state * level)));
             level = level.map(|level| level * section.dc_gain());
         }
         // Two sections at a time share a pass over the samples.

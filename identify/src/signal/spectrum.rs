@@ -20,9 +20,7 @@ pub(crate) fn hann_power(signal: &[f64]) -> Vec<f64> {
         re[i] = (value - mean) * (PI * (i as f64 + 0.5) / n as f64).sin().powi(2);
     }
     transform(&mut re, &mut im);
-    (0..=padded / 2)
-        .map(|k| re[k] * re[k] + im[k] * im[k])
-        .collect()
+    (0..=padded / 2).map(|k| re[k] * re[k] + im[k] * im[k]).collect()
 }
 
 /// Discrete Fourier transform in place; the length must be a power of two.
@@ -44,9 +42,7 @@ fn transform(re: &mut [f64], im: &mut [f64]) {
     // Combine transforms of half the length, until the complete length is reached.
     let mut half = 1;
     while half < n {
-        let twiddles: Vec<(f64, f64)> = (0..half)
-            .map(|k| (-PI * k as f64 / half as f64).sin_cos())
-            .collect();
+        let twiddles: Vec<(f64, f64)> = (0..half).map(|k| (-PI * k as f64 / half as f64).sin_cos()).collect();
         // Butterflies of each block.
         for start in (0..n).step_by(2 * half) {
             for (k, (sin, cos)) in twiddles.iter().enumerate() {
@@ -84,9 +80,7 @@ mod tests {
             .map(|i| 3.0 + (2.0 * PI * 0.125 * f64::from(i)).sin())
             .collect();
         let power = hann_power(&tone);
-        let peak = (0..power.len())
-            .max_by(|a, b| power[*a].total_cmp(&power[*b]))
-            .unwrap();
+        let peak = (0..power.len()).max_by(|a, b| power[*a].total_cmp(&power[*b])).unwrap();
         assert_eq!(peak, 128);
     }
 }

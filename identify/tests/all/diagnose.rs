@@ -4,9 +4,9 @@
 use std::f64::consts::TAU;
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
-    DiagnosisVerdict, EffectParameter, ForceColumn, LocatedEffect, ModelDiagnosis,
-    NoColumnProvider, SampleLayout, SampleSegment, SignConstraint, diagnose, white_noise,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, DiagnosisVerdict, EffectParameter,
+    ForceColumn, LocatedEffect, ModelDiagnosis, NoColumnProvider, SampleLayout, SampleSegment, SignConstraint,
+    diagnose, white_noise,
 };
 use modelmill_runtime::RandomBits;
 
@@ -100,18 +100,13 @@ fn candidate(kind: &str, columns: &[&[f64]], sign: SignConstraint) -> CandidateE
 fn crowd(random: &mut Random, count: usize) -> (Vec<Vec<f64>>, Vec<CandidateEffect>) {
     let columns: Vec<Vec<f64>> = (0..count).map(|_| random.smooth()).collect();
     let made = columns.iter().enumerate();
-    let candidates =
-        made.map(|(k, values)| candidate(&format!("c{k}"), &[values], SignConstraint::Any));
+    let candidates = made.map(|(k, values)| candidate(&format!("c{k}"), &[values], SignConstraint::Any));
     let candidates = candidates.collect();
     (columns, candidates)
 }
 
 /// A model of three columns, a recording for the fit and one for the check, of which `hidden` is what the model lacks.
-fn problem(
-    random: &mut Random,
-    hidden: &[f64],
-    candidates: Vec<CandidateEffect>,
-) -> DiagnosisProblem {
+fn problem(random: &mut Random, hidden: &[f64], candidates: Vec<CandidateEffect>) -> DiagnosisProblem {
     let base: Vec<Vec<f64>> = (0..3).map(|_| random.smooth()).collect();
     let mut measured = hidden.to_vec();
     for (values, factor) in base.iter().zip([3.0, -2.0, 1.5]) {
@@ -119,7 +114,7 @@ fn problem(
             *sum += factor * x;
         }
     }
-    let stretch = |name: &str, is_check: bool| SampleSegment {
+    let segment = |name: &str, is_check: bool| SampleSegment {
         name: name.into(),
         samples: SAMPLES,
         step: STEP,
@@ -129,7 +124,7 @@ fn problem(
     DiagnosisProblem {
         layout: SampleLayout {
             channels: vec!["drive".into()],
-            segments: vec![stretch("fit", false), stretch("check", true)],
+            segments: vec![segment("fit", false), segment("check", true)],
             left_out: Vec::new(),
         },
         noise: vec![white_noise(&measured)],
@@ -139,10 +134,7 @@ fn problem(
         base_is_part_of_load: vec![true; 3],
         friction: Vec::new(),
         candidates,
-        variables: vec![
-            ("q".into(), random.smooth()),
-            ("q_d".into(), random.smooth()),
-        ],
+        variables: vec![("q".into(), random.smooth()), ("q_d".into(), random.smooth())],
         ..DiagnosisProblem::default()
     }
 }
@@ -162,9 +154,7 @@ fn answer(problem: &DiagnosisProblem) -> ModelDiagnosis {
 
 /// Kinds that were found, in the order of their names.
 fn found(diagnosis: &ModelDiagnosis) -> Vec<&str> {
-    let mut kinds: Vec<&str> = (diagnosis.effects.iter())
-        .map(|e| e.effect.kind.as_str())
-        .collect();
+    let mut kinds: Vec<&str> = (diagnosis.effects.iter()).map(|e| e.effect.kind.as_str()).collect();
     kinds.sort_unstable();
     kinds
 }
@@ -188,11 +178,7 @@ fn one_hidden_column_is_found_among_twenty() {
         let problem = problem(&mut random, &hidden, candidates);
         let diagnosis = answer(&problem);
         assert_eq!(found(&diagnosis), ["c7"], "seed {seed}");
-        assert_eq!(
-            diagnosis.verdict,
-            DiagnosisVerdict::MissingEffect,
-            "seed {seed}"
-        );
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::MissingEffect, "seed {seed}");
         let estimate = diagnosis.effects[0].estimates[0];
         // Three deviations of a factor are 3 * 0.1 / sqrt(1500 * 1) with a column of size 1; some are smaller.
         assert!((estimate - 0.5).abs() < 0.03, "seed {seed}: {estimate}");
@@ -201,10 +187,7 @@ fn one_hidden_column_is_found_among_twenty() {
         };
         assert!(last.check < 0.6 * first.check, "seed {seed}");
         let left = deviation(&diagnosis.residual[0]) / NOISE;
-        assert!(
-            (0.95..1.05).contains(&left),
-            "seed {seed}: {left} of the noise"
-        );
+        assert!((0.95..1.05).contains(&left), "seed {seed}: {left} of the noise");
         assert_eq!(refused(&diagnosis, "c7"), None);
         assert!(refused(&diagnosis, "c3").is_some());
     }
@@ -224,11 +207,7 @@ fn two_hidden_columns_are_found_together() {
         let diagnosis = answer(&problem(&mut random, &hidden, candidates));
         assert_eq!(found(&diagnosis), ["c11", "c2"], "seed {seed}");
         for effect in &diagnosis.effects {
-            let truth = if effect.effect.kind == "c2" {
-                0.4
-            } else {
-                -0.3
-            };
+            let truth = if effect.effect.kind == "c2" { 0.4 } else { -0.3 };
             let estimate = effect.estimates[0];
             assert!((estimate - truth).abs() < 0.03, "seed {seed}: {estimate}");
         }
@@ -300,10 +279,7 @@ fn different_columns_are_told_apart() {
 
 #[test]
 fn an_impossible_sign_is_refused() {
-    for (sign, factor) in [
-        (SignConstraint::Positive, -0.5),
-        (SignConstraint::Negative, 0.5),
-    ] {
+    for (sign, factor) in [(SignConstraint::Positive, -0.5), (SignConstraint::Negative, 0.5)] {
         let mut random = Random::new(500);
         let law = random.smooth();
         let hidden = sum(&[(factor, &law), (1.0, &random.white())]);
@@ -354,11 +330,7 @@ fn what_no_candidate_has_is_unexplained() {
         let law: Vec<f64> = q.iter().zip(rate).map(|(q, v)| 0.4 * q * v * v).collect();
         problem.measured.add(1.0, &column(&law));
         let diagnosis = answer(&problem);
-        assert_eq!(
-            diagnosis.verdict,
-            DiagnosisVerdict::Unexplained,
-            "seed {seed}"
-        );
+        assert_eq!(diagnosis.verdict, DiagnosisVerdict::Unexplained, "seed {seed}");
         assert_eq!(diagnosis.unexplained, [0], "seed {seed}");
         again.push(diagnosis.repeatable_share[0]);
         if !diagnosis.effects.is_empty() {

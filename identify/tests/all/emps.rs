@@ -8,8 +8,8 @@ use std::path::PathBuf;
 
 use modelmill_identify::estimate::uncertainty_with_autocorrelation;
 use modelmill_identify::{
-    LeastSquares, LeastSquaresError, LocateOptions, PreparedRun, SignalRecording, StatePreparation,
-    compare_forces, decimate_table, decimate_time, locate_errors,
+    LeastSquares, LeastSquaresError, LocateOptions, PreparedRun, SignalRecording, StatePreparation, compare_forces,
+    decimate_table, decimate_time, locate_errors,
 };
 
 fn data() -> Option<PathBuf> {
@@ -17,9 +17,7 @@ fn data() -> Option<PathBuf> {
     if folder.join("emps_train.csv").is_file() {
         return Some(folder);
     }
-    println!(
-        "EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace."
-    );
+    println!("EMPS is not tested: there are no recordings in ../shared/data/emps beside the workspace.");
     None
 }
 
@@ -31,28 +29,17 @@ struct Regression {
 }
 
 fn read(path: PathBuf) -> PreparedRun {
-    let recording = SignalRecording::read(
-        path,
-        &[("t", "t_s"), ("x", "q_meas_m"), ("axis", "force_N")],
-    )
-    .expect("a readable file");
+    let recording =
+        SignalRecording::read(path, &[("t", "t_s"), ("x", "q_meas_m"), ("axis", "force_N")]).expect("a readable file");
     recording
-        .states_with(
-            &["x".to_owned()],
-            &["axis".to_owned()],
-            &StatePreparation::emps(),
-        )
+        .states_with(&["x".to_owned()], &["axis".to_owned()], &StatePreparation::emps())
         .expect("states")
 }
 
 /// Columns qdd, qd, sign(qd), 1, decimated in parallel with the force.
 fn regression(run: &PreparedRun) -> Regression {
     let (qd, qdd) = (&run.qd[0], &run.qdd[0]);
-    let full: Vec<f64> = qd
-        .iter()
-        .zip(qdd)
-        .flat_map(|(v, a)| [*a, *v, sign(*v), 1.0])
-        .collect();
+    let full: Vec<f64> = qd.iter().zip(qdd).flat_map(|(v, a)| [*a, *v, sign(*v), 1.0]).collect();
     let factor = run.prepared.decimate;
     let force = run.measured_interleaved().expect("a force");
     Regression {
@@ -80,11 +67,7 @@ fn relative_error(data: &Regression, values: &[f64]) -> f64 {
         std::slice::from_ref(&data.force),
         std::slice::from_ref(&model(data, values)),
     );
-    100.0
-        * figures
-            .expect("figures")
-            .nrms
-            .expect("a force was measured")
+    100.0 * figures.expect("figures").nrms.expect("a force was measured")
 }
 
 #[test]
@@ -95,8 +78,7 @@ fn the_published_parameters_come_out() {
     assert_eq!(train.force.len(), 2475);
     assert_eq!(train.time.len(), 2475);
     let mut fit = LeastSquares::new(4);
-    fit.add_rows(&train.regressor, &train.force)
-        .expect("finite rows");
+    fit.add_rows(&train.regressor, &train.force).expect("finite rows");
     let solution = fit.solve().expect("a solution");
     let deviations = uncertainty_with_autocorrelation(&solution, 1, |visit| {
         visit(&train.regressor, &train.force)?;
@@ -104,12 +86,7 @@ fn the_published_parameters_come_out() {
     })
     .expect("deviations");
 
-    let published = [
-        ("M", 95.1089),
-        ("Fv", 203.5034),
-        ("Fc", 20.3935),
-        ("offset", -3.1648),
-    ];
+    let published = [("M", 95.1089), ("Fv", 203.5034), ("Fc", 20.3935), ("offset", -3.1648)];
     for (j, (name, expected)) in published.iter().enumerate() {
         let value = solution.values[j];
         println!(
@@ -130,17 +107,12 @@ fn the_published_parameters_come_out() {
     let on_train = relative_error(&train, &solution.values);
     let pulses = regression(&read(folder.join("emps_pulses.csv")));
     let on_pulses = relative_error(&pulses, &solution.values);
-    println!(
-        "relative error: train {on_train:.3} % (published 4.083), pulses {on_pulses:.3} % (published 5.982)"
-    );
+    println!("relative error: train {on_train:.3} % (published 4.083), pulses {on_pulses:.3} % (published 5.982)");
     assert!((on_train - 4.083).abs() < 0.15);
     assert!((on_pulses - 5.982).abs() < 0.15);
 
     // The residual is strongly autocorrelated, and the deviations must say so.
-    println!(
-        "lag-1 correlation of the residual {:.3}",
-        deviations.residual_lag1[0]
-    );
+    println!("lag-1 correlation of the residual {:.3}", deviations.residual_lag1[0]);
     assert!((deviations.residual_lag1[0] - 0.66).abs() < 0.05);
     for j in 0..4 {
         assert!(deviations.std[j] > 1.5 * solution.classical_std[j]);
@@ -172,8 +144,7 @@ fn friction_by_direction_explains_what_was_published() {
         .iter()
         .zip(qdd)
         .flat_map(|(v, a)| {
-            let (forward, backward) =
-                (f64::from(u8::from(*v > 0.0)), f64::from(u8::from(*v < 0.0)));
+            let (forward, backward) = (f64::from(u8::from(*v > 0.0)), f64::from(u8::from(*v < 0.0)));
             [*a, v * forward, forward, v * backward, -backward]
         })
         .collect();
@@ -184,11 +155,7 @@ fn friction_by_direction_explains_what_was_published() {
     let solution = fit.solve().expect("a solution");
     let error = 100.0 * solution.residual_norm / solution.measured_norm;
     println!("{:?}, {error:.3} %", solution.values);
-    for (value, published) in solution
-        .values
-        .iter()
-        .zip([95.154, 166.706, 20.144, 240.424, 20.628])
-    {
+    for (value, published) in solution.values.iter().zip([95.154, 166.706, 20.144, 240.424, 20.628]) {
         assert!(
             (value / published - 1.0).abs() < 0.025,
             "{value} instead of {published}"

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use modelmill_identify::{
-    ComputedColumn, NonFinitePolicy, ReadOptions, RecordingFault, SignalRecording,
-    display_name_of_bytes,
+    ComputedColumn, NonFinitePolicy, ReadOptions, RecordingFault, SignalRecording, display_name_of_bytes,
 };
 use parquet::basic::Compression;
 use parquet::data_type::{DoubleType, FloatType, Int64Type};
@@ -19,9 +18,7 @@ fn scratch(name: &str) -> PathBuf {
 }
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/fixtures")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
 const SAMPLES: usize = 20_000;
@@ -37,12 +34,9 @@ fn write_parquet(path: &Path, compression: Compression) {
          optional double motor; required double spare; }",
     )
     .expect("a schema");
-    let properties = WriterProperties::builder()
-        .set_compression(compression)
-        .build();
+    let properties = WriterProperties::builder().set_compression(compression).build();
     let file = File::create(path).expect("a writable folder");
-    let mut writer =
-        SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
     for group in 0..2 {
         let rows = group * SAMPLES / 2..(group + 1) * SAMPLES / 2;
         let mut columns = writer.next_row_group().expect("a row group");
@@ -56,10 +50,7 @@ fn write_parquet(path: &Path, compression: Compression) {
             .write_batch(&stamps, None, None)
             .expect("written");
         column.close().expect("closed");
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "the column is of that type"
-        )]
+        #[expect(clippy::cast_possible_truncation, reason = "the column is of that type")]
         let q: Vec<f32> = rows.clone().map(|k| time(k).sin() as f32).collect();
         let mut column = columns.next_column().expect("no fault").expect("a column");
         column
@@ -67,11 +58,7 @@ fn write_parquet(path: &Path, compression: Compression) {
             .write_batch(&q, None, None)
             .expect("written");
         column.close().expect("closed");
-        let force: Vec<f64> = rows
-            .clone()
-            .filter(|k| *k != 7)
-            .map(|k| 3.0 * time(k))
-            .collect();
+        let force: Vec<f64> = rows.clone().filter(|k| *k != 7).map(|k| 3.0 * time(k)).collect();
         let levels: Vec<i16> = rows.clone().map(|k| i16::from(k != 7)).collect();
         let mut column = columns.next_column().expect("no fault").expect("a column");
         column
@@ -144,12 +131,7 @@ fn every_format_is_read_from_memory_too() {
     write_parquet(&parquet, Compression::SNAPPY);
     let csv = scratch("memory.csv");
     std::fs::write(&csv, "t,q\n0,1.5\n0.1,1.6\n").unwrap();
-    for path in [
-        &parquet,
-        &csv,
-        &fixture("run-v7.mat"),
-        &fixture("run-v6.mat"),
-    ] {
+    for path in [&parquet, &csv, &fixture("run-v7.mat"), &fixture("run-v6.mat")] {
         let bytes = std::fs::read(path).unwrap();
         let file = path.display().to_string();
         assert_eq!(
@@ -181,9 +163,7 @@ fn every_format_is_read_from_memory_too() {
     let broken = bytes;
     let broken = &broken[..broken.len() / 2];
     for says in [
-        SignalRecording::names_in_bytes(broken, "-")
-            .unwrap_err()
-            .to_string(),
+        SignalRecording::names_in_bytes(broken, "-").unwrap_err().to_string(),
         SignalRecording::from_bytes(b"MATLAB 7.3 MAT-file, Platform", "-", &options())
             .unwrap_err()
             .to_string(),
@@ -208,12 +188,7 @@ fn only_the_time_that_is_asked_for_is_read() {
     };
     let recording = part((2.0, 12.0)).unwrap();
     assert!((9_999..=10_001).contains(&recording.samples()));
-    assert!(
-        recording.notes()[0]
-            .says
-            .in_library_words()
-            .contains("time stamps")
-    );
+    assert!(recording.notes()[0].says.in_library_words().contains("time stamps"));
     assert!(
         recording.notes()[1]
             .says
@@ -222,15 +197,11 @@ fn only_the_time_that_is_asked_for_is_read() {
     );
     assert_eq!(
         part((30.0, 40.0)).unwrap_err().fault,
-        RecordingFault::NoSamplesInInterval {
-            from: 30.0,
-            to: 40.0
-        }
+        RecordingFault::NoSamplesInInterval { from: 30.0, to: 40.0 }
     );
     let says = part((0.0, 20.0)).unwrap_err().to_string();
     assert!(
-        says.contains("too large to be kept in memory")
-            && says.contains("option `between` = `0,10`"),
+        says.contains("too large to be kept in memory") && says.contains("option `between` = `0,10`"),
         "{says}"
     );
 }
@@ -242,13 +213,8 @@ fn broken_files_get_an_answer() {
     let bytes = std::fs::read(&path).unwrap();
     for length in [4, 100, bytes.len() / 2, bytes.len() - 1] {
         std::fs::write(&path, &bytes[..length]).unwrap();
-        let says = SignalRecording::read_with(&path, &options())
-            .unwrap_err()
-            .to_string();
-        assert!(
-            says.contains("this is a Parquet file: it cannot be read"),
-            "{says}"
-        );
+        let says = SignalRecording::read_with(&path, &options()).unwrap_err().to_string();
+        assert!(says.contains("this is a Parquet file: it cannot be read"), "{says}");
     }
     let path = scratch("broken.mat");
     let bytes = std::fs::read(fixture("run-v7.mat")).unwrap();
@@ -266,8 +232,7 @@ fn broken_files_get_an_answer() {
 #[test]
 fn matlab_files_give_vectors_and_columns_of_matrices() {
     for name in ["run-v7.mat", "run-v6.mat"] {
-        let recording =
-            SignalRecording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
+        let recording = SignalRecording::read(fixture(name), &[("q1", "q_1"), ("motor", "F")]).unwrap();
         assert_eq!(recording.samples(), 50, "{name}");
         for k in [0, 1, 49] {
             let t = k as f64 * 0.01;
@@ -278,10 +243,7 @@ fn matlab_files_give_vectors_and_columns_of_matrices() {
                 ("motor", 3.0 * k as f64),
             ] {
                 let value = recording.column(column).unwrap()[k];
-                assert!(
-                    (value - expected).abs() < 1e-12,
-                    "{name}: {column} is {value}"
-                );
+                assert!((value - expected).abs() < 1e-12, "{name}: {column} is {value}");
             }
         }
     }
@@ -290,10 +252,7 @@ fn matlab_files_give_vectors_and_columns_of_matrices() {
     assert!(says.contains("`gain`") && !says.contains("`z`"), "{says}");
     // Complex numbers are refused as such, not read by their real parts.
     let says = recording.column("z").unwrap_err().to_string();
-    assert!(
-        says.contains("`z`") && says.contains("a complex number"),
-        "{says}"
-    );
+    assert!(says.contains("`z`") && says.contains("a complex number"), "{says}");
 }
 
 #[test]
@@ -303,10 +262,7 @@ fn sums_of_columns_are_computed_and_keep_their_faults() {
         let options = ReadOptions {
             computed: vec![ComputedColumn {
                 name: "a".to_owned(),
-                terms: terms
-                    .iter()
-                    .map(|(name, f)| ((*name).to_owned(), *f))
-                    .collect(),
+                terms: terms.iter().map(|(name, f)| ((*name).to_owned(), *f)).collect(),
                 offset: 0.5,
             }],
             not_finite,

@@ -78,20 +78,12 @@ fn same_in(folder: &Path) {
         for name in OURS {
             let (found, expected) = (recording.column(name).unwrap(), csv.column(name).unwrap());
             for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-                assert_eq!(
-                    found.to_bits(),
-                    expected.to_bits(),
-                    "{file}: {name}, sample {k}"
-                );
+                assert_eq!(found.to_bits(), expected.to_bits(), "{file}: {name}, sample {k}");
             }
         }
         let bytes = std::fs::read(&path).unwrap();
         let piped = SignalRecording::from_bytes(&bytes, "a pipe", &options(&theirs)).unwrap();
-        assert_eq!(
-            piped.column("tau_2").unwrap(),
-            csv.column("tau_2").unwrap(),
-            "{file}"
-        );
+        assert_eq!(piped.column("tau_2").unwrap(), csv.column("tau_2").unwrap(), "{file}");
         let with_columns = tables(&path).into_iter().find(|table| {
             let mut columns = table.columns.iter();
             columns.any(|column| column.name == theirs[1])
@@ -101,8 +93,7 @@ fn same_in(folder: &Path) {
         let rate = table.rate().unwrap();
         assert!((rate - 250.0).abs() < 1e-6, "{file}: {rate}");
         // A file that lost its end is no recording.
-        let cut =
-            SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
+        let cut = SignalRecording::from_bytes(&bytes[..bytes.len() * 2 / 3], file, &options(&theirs));
         assert!(cut.is_err(), "{file}");
     }
 }
@@ -119,9 +110,7 @@ fn files_that_are_made_now_give_the_same_numbers() {
     let packages = "import h5py, pyarrow, mcap_ros2, rosbags, zstandard";
     let has = Command::new(&python).args(["-c", packages]).output();
     if !has.is_ok_and(|output| output.status.success()) {
-        println!(
-            "left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one"
-        );
+        println!("left out: `{python}` lacks packages ({packages}); MODELMILL_PYTHON names another one");
         return;
     }
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("logs");
@@ -133,11 +122,7 @@ fn files_that_are_made_now_give_the_same_numbers() {
         .arg("3001")
         .output()
         .unwrap();
-    assert!(
-        made.status.success(),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     same_in(&folder);
 }
 
@@ -152,11 +137,7 @@ fn whole_numbers_of_all_types_are_read_right() {
                 ("u8", "uint32", (200.0 + x) % 256.0),
                 ("u16", "uint32", 65535.0 - x),
                 ("u32", "uint32", 4_294_967_295.0 - x),
-                (
-                    "u64",
-                    "uint64",
-                    18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0),
-                ),
+                ("u64", "uint64", 18_446_744_073_709_551_616.0 - 4096.0 * (x + 1.0)),
                 ("i8", "int32", x - 128.0),
                 ("i16", "int32", -x),
                 ("i32", "int32", x - 2_147_483_648.0),
@@ -185,18 +166,15 @@ fn datasets_of_all_types_are_read_right() {
                 ("more.group11.x", q + 11.0),
             ] {
                 let value = recording.column(name).unwrap()[k];
-                assert!(
-                    (value - expected).abs() < 1e-12,
-                    "{file}: {name} is {value}"
-                );
+                assert!((value - expected).abs() < 1e-12, "{file}: {name} is {value}");
             }
         }
         let notes = recording.notes();
         assert!(
-            notes.iter().any(
-                |note| note.says.in_library_words().contains("`calibration`")
-                    && note.says.in_library_words().contains("`operator`")
-            ),
+            notes
+                .iter()
+                .any(|note| note.says.in_library_words().contains("`calibration`")
+                    && note.says.in_library_words().contains("`operator`")),
             "{notes:?}"
         );
     }
@@ -206,10 +184,7 @@ fn datasets_of_all_types_are_read_right() {
 fn messages_of_any_type_become_columns() {
     let path = fixtures().join("run-zstd.mcap");
     let topics = tables(&path);
-    let status: Vec<_> = topics
-        .iter()
-        .filter(|topic| topic.name == "status")
-        .collect();
+    let status: Vec<_> = topics.iter().filter(|topic| topic.name == "status").collect();
     assert_eq!(status.len(), 1);
     assert_eq!(
         (status[0].kind.as_str(), status[0].samples),
@@ -247,19 +222,10 @@ fn messages_of_any_type_become_columns() {
     };
     let current = one("status.drives.right.current");
     let expected: Vec<f64> = (0..12).map(|i| -5.0 * f64::from(i)).collect();
-    assert_eq!(
-        current.column("status.drives.right.current").unwrap(),
-        expected
-    );
+    assert_eq!(current.column("status.drives.right.current").unwrap(), expected);
     assert!(
-        current.notes()[0]
-            .says
-            .in_library_words()
-            .contains("`status`")
-            && current.notes()[0]
-                .says
-                .in_library_words()
-                .contains("arrival"),
+        current.notes()[0].says.in_library_words().contains("`status`")
+            && current.notes()[0].says.in_library_words().contains("arrival"),
         "{:?}",
         current.notes()
     );
@@ -298,8 +264,7 @@ fn topics_are_joined_on_time() {
         .map(|note| note.says.in_library_words())
         .collect();
     assert!(
-        says.iter()
-            .any(|says| says.contains("1 sample of `joint_states`")),
+        says.iter().any(|says| says.contains("1 sample of `joint_states`")),
         "{says:?}"
     );
     assert!(

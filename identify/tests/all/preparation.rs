@@ -3,9 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use modelmill_identify::{
-    PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation,
-};
+use modelmill_identify::{PreparedRun, ReadOptions, SignalRecording, SmoothingMethod, StatePreparation};
 use modelmill_runtime::RandomBits;
 
 const RATE: f64 = 250.0;
@@ -37,15 +35,12 @@ fn prepared(seed: u64, samples: u32, smoothing: SmoothingMethod) -> PreparedRun 
         let read = ((motion(seed, t)[0] + noise) / step).round() * step;
         writeln!(text, "{t},{read:.9}").unwrap();
     }
-    let recording =
-        SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
+    let recording = SignalRecording::from_reader(text.as_bytes(), "run.csv", &ReadOptions::default()).unwrap();
     let preparation = StatePreparation {
         smoothing,
         ..StatePreparation::default()
     };
-    recording
-        .states_with(&["q".to_owned()], &[], &preparation)
-        .unwrap()
+    recording.states_with(&["q".to_owned()], &[], &preparation).unwrap()
 }
 
 /// RMS error of the acceleration.

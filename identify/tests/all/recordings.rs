@@ -4,8 +4,8 @@
 use std::fmt::Write as _;
 
 use modelmill_identify::{
-    DerivativeSource, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault,
-    SignalRecording, StatePreparation,
+    DerivativeSource, NonFinitePolicy, NoteSeverity, ReadOptions, RecordingError, RecordingFault, SignalRecording,
+    StatePreparation,
 };
 
 fn read(text: &str) -> Result<SignalRecording, RecordingError> {
@@ -18,10 +18,7 @@ fn names(list: &[&str]) -> Vec<String> {
 
 #[track_caller]
 fn check_refused(text: &str, expected: &str) {
-    assert_eq!(
-        read(text).expect_err("the recording is faulty").to_string(),
-        expected
-    );
+    assert_eq!(read(text).expect_err("the recording is faulty").to_string(), expected);
 }
 
 #[test]
@@ -56,28 +53,16 @@ fn files_that_are_no_recordings() {
         .chain("t,q\n0,1\n".encode_utf16())
         .flat_map(u16::to_le_bytes)
         .collect();
-    let error = SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default())
-        .unwrap_err();
+    let error = SignalRecording::from_reader(utf16.as_slice(), "run.csv", &ReadOptions::default()).unwrap_err();
     assert_eq!(
         error.fault,
         RecordingFault::NotCsv {
             looks_like: "UTF-16 text"
         }
     );
-    let error = SignalRecording::from_reader(
-        [b't', b',', 0xE9, b'\n'].as_slice(),
-        "run.csv",
-        &ReadOptions::default(),
-    );
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("another encoding than UTF-8")
-    );
-    let missing = SignalRecording::read("no/such/run.csv", &[])
-        .unwrap_err()
-        .to_string();
+    let error = SignalRecording::from_reader([b't', b',', 0xE9, b'\n'].as_slice(), "run.csv", &ReadOptions::default());
+    assert!(error.unwrap_err().to_string().contains("another encoding than UTF-8"));
+    let missing = SignalRecording::read("no/such/run.csv", &[]).unwrap_err().to_string();
     assert!(
         missing.starts_with("no/such/run.csv: the recording cannot be read:"),
         "{missing}"
@@ -112,11 +97,7 @@ fn faults_of_header_and_lines() {
 fn a_quote_left_open_is_named_where_it_opens() {
     let check = |text: &str, line: u64| {
         let error = read(text).expect_err("the recording is faulty");
-        assert_eq!(
-            error.fault,
-            RecordingFault::OpenQuote { line },
-            "{text:?}: {error}"
-        );
+        assert_eq!(error.fault, RecordingFault::OpenQuote { line }, "{text:?}: {error}");
         assert!(
             error.to_string().starts_with(&format!(
                 "run.csv, line {line}: a quote opens here, but the field that it begins does not end in the same line;"
@@ -149,8 +130,7 @@ fn a_quote_left_open_is_named_where_it_opens() {
 
 #[test]
 fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
-    let recording =
-        read("t,q,f,remark\n0,1,NaN,start\n0.1,abc,2,\n0.2,x,inf,end\n0.3,4,,\n").unwrap();
+    let recording = read("t,q,f,remark\n0,1,NaN,start\n0.1,abc,2,\n0.2,x,inf,end\n0.3,4,,\n").unwrap();
     assert_eq!(recording.column("t").unwrap(), [0.0, 0.1, 0.2, 0.3]);
     assert_eq!(
         recording.column("q").unwrap_err().to_string(),
@@ -168,9 +148,10 @@ fn a_column_with_other_things_than_numbers_is_refused_when_it_is_used() {
         .iter()
         .map(|note| note.says.in_library_words())
         .collect();
-    assert!(says.iter().any(|s| {
-        s.contains("Column `remark` of run.csv contains text that is not a number (2 fields")
-    }));
+    assert!(
+        says.iter()
+            .any(|s| { s.contains("Column `remark` of run.csv contains text that is not a number (2 fields") })
+    );
     let decimal_comma = read("t;q\n0;1,5\n1;1,6\n").unwrap();
     assert!(
         decimal_comma
@@ -215,10 +196,7 @@ fn renamings_and_missing_columns() {
         )
     };
     let recording = read(&[("t", "t_s"), ("spindle_left", "F_left")]).unwrap();
-    assert_eq!(
-        recording.names().collect::<Vec<_>>(),
-        ["t", "theta1", "spindle_left"]
-    );
+    assert_eq!(recording.names().collect::<Vec<_>>(), ["t", "theta1", "spindle_left"]);
     assert_eq!(
         read(&[]).unwrap().column("t").unwrap_err().to_string(),
         "run.csv: there is no column `t`; did you mean `t_s`? The columns are: `t_s`, `theta1`, `F_left`. \
@@ -254,11 +232,7 @@ fn marks_line_ends_and_separators_of_other_programs() {
         "\"t\",\"q\"\n 0 , 1 \n+1e-1, 2.0\n\n",
     ] {
         let recording = read(text).unwrap();
-        assert_eq!(
-            recording.names().collect::<Vec<_>>(),
-            ["t", "q"],
-            "{text:?}"
-        );
+        assert_eq!(recording.names().collect::<Vec<_>>(), ["t", "q"], "{text:?}");
         assert_eq!(recording.column("q").unwrap(), [1.0, 2.0], "{text:?}");
     }
 }
@@ -266,15 +240,9 @@ fn marks_line_ends_and_separators_of_other_programs() {
 #[test]
 fn recorded_derivatives_are_taken_as_they_are() {
     let text = "t,q,q_d,q_dd,drive\n0,1,10,100,5\n0.1,2,20,200,6\n0.2,3,30,300,7\n";
-    let run = read(text)
-        .unwrap()
-        .states(&names(&["q"]), &names(&["drive"]))
-        .unwrap();
+    let run = read(text).unwrap().states(&names(&["q"]), &names(&["drive"])).unwrap();
     assert_eq!((run.samples(), run.prepared.cutoff_hz), (3, None));
-    assert_eq!(
-        (run.q[0][1], run.qd[0][1], run.qdd[0][1]),
-        (2.0, 20.0, 200.0)
-    );
+    assert_eq!((run.q[0][1], run.qd[0][1], run.qdd[0][1]), (2.0, 20.0, 200.0));
     assert_eq!(run.measured_interleaved().unwrap(), [5.0, 6.0, 7.0]);
     assert!(run.notes.is_empty());
 }
@@ -307,10 +275,7 @@ fn time_must_increase_and_gaps_are_said() {
     assert_eq!(run.notes[0].severity, NoteSeverity::Warning);
     assert!(
         run.notes[0].says.in_library_words().contains("1 gap ")
-            && run.notes[0]
-                .says
-                .in_library_words()
-                .contains("after line 4"),
+            && run.notes[0].says.in_library_words().contains("after line 4"),
         "{}",
         run.notes[0].says.in_library_words()
     );
@@ -338,19 +303,16 @@ fn sine(columns: &[&str]) -> SignalRecording {
 
 #[test]
 fn missing_derivatives_are_prepared_and_said() {
-    let truth = sine(&["q", "q_d", "q_dd"])
-        .states(&names(&["q"]), &[])
-        .unwrap();
+    let truth = sine(&["q", "q_d", "q_dd"]).states(&names(&["q"]), &[]).unwrap();
     for columns in [&["q", "drive"][..], &["q", "q_d"], &["q", "q_dd"]] {
         let run = sine(columns).states(&names(&["q"]), &[]).unwrap();
         let (start, end) = run.prepared.trimmed;
         assert!(start > 0 && run.samples() == 400 - start - end);
         assert!(run.prepared.cutoff_chosen);
         assert!(
-            run.notes.iter().any(|note| note
-                .says
-                .in_library_words()
-                .contains("chosen from the signal")),
+            run.notes
+                .iter()
+                .any(|note| note.says.in_library_words().contains("chosen from the signal")),
             "{:?}",
             run.notes
         );
@@ -384,11 +346,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
         .states_with(&names(&["q"]), &[], &preparation)
         .unwrap();
     assert_eq!(
-        (
-            run.prepared.cutoff_hz,
-            run.prepared.trimmed,
-            run.prepared.decimate
-        ),
+        (run.prepared.cutoff_hz, run.prepared.trimmed, run.prepared.decimate),
         (Some(30.0), (7, 3), 5)
     );
     assert_eq!(run.samples(), 390);
@@ -401,10 +359,7 @@ fn a_preparation_of_ones_own_is_kept_to() {
         .states_with(&names(&["q"]), &[], &bad)
         .unwrap_err()
         .to_string();
-    assert!(
-        error.contains("150 Hz") && error.contains("below 100"),
-        "{error}"
-    );
+    assert!(error.contains("150 Hz") && error.contains("below 100"), "{error}");
     let bad = StatePreparation {
         trim: Some((usize::MAX, 1)),
         ..preparation
@@ -438,18 +393,13 @@ fn short_and_still_recordings_get_an_answer() {
         "run.csv: 2 samples are too few for preparing derivatives from positions, which takes at least 16; \
          use a longer recording"
     );
-    assert!(
-        read("t,q\n0,1\n")
-            .unwrap()
-            .states(&names(&["q"]), &[])
-            .is_err()
-    );
+    assert!(read("t,q\n0,1\n").unwrap().states(&names(&["q"]), &[]).is_err());
     let still = sine(&["still"]).states(&names(&["still"]), &[]).unwrap();
     assert!(
-        still.notes.iter().any(|note| note
-            .says
-            .in_library_words()
-            .contains("`still` does not move")),
+        still
+            .notes
+            .iter()
+            .any(|note| note.says.in_library_words().contains("`still` does not move")),
         "{:?}",
         still.notes
     );
@@ -459,8 +409,7 @@ fn short_and_still_recordings_get_an_answer() {
 /// Ten thousand mutilated recordings: an answer each, no panic.
 #[test]
 fn mutilated_recordings_get_an_answer() {
-    let sound = b"\xEF\xBB\xBFt,q,drive\r\n0,1,2\r\n0.1,1.5,2e3\r\n0.2,-1,\"3\"\r\n0.3,NaN,inf\r\n"
-        .to_vec();
+    let sound = b"\xEF\xBB\xBFt,q,drive\r\n0,1,2\r\n0.1,1.5,2e3\r\n0.2,-1,\"3\"\r\n0.3,NaN,inf\r\n".to_vec();
     let pieces: [&[u8]; 12] = [
         b",", b";", b"\t", b"\r", b"\n", b"\"", b"NaN", b"1e400", b"-", b"\0", b"\xFF", b"t",
     ];

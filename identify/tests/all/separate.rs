@@ -5,8 +5,7 @@ use std::ops::ControlFlow;
 
 use modelmill_identify::excite::separate::{SeparationProblem, measure_separation};
 use modelmill_identify::excite::{
-    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, ExciteError, Options,
-    excite,
+    ExcitationCriterion, ExcitationLimits, ExcitationMotion, ExcitationPlant, ExciteError, Options, excite,
 };
 use nalgebra::DMatrix;
 
@@ -35,9 +34,7 @@ impl ExcitationPlant for Axis {
 
     fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
         let [q, qd, qdd] = [&motion.q[0], &motion.qd[0], &motion.qdd[0]];
-        let columns = |laws: &[Law]| {
-            DMatrix::from_fn(q.len(), laws.len(), |i, k| laws[k]([q[i], qd[i], qdd[i]]))
-        };
+        let columns = |laws: &[Law]| DMatrix::from_fn(q.len(), laws.len(), |i, k| laws[k]([q[i], qd[i], qdd[i]]));
         let effect = columns(&[self.effect]);
         let question = SeparationProblem {
             base: columns(&self.base),
@@ -113,9 +110,6 @@ fn a_spring_beside_a_mass_takes_two_harmonics() {
     }
     let apart = found(&axis, 2).unwrap();
     println!("{best:.6} is the best of all");
-    assert!(
-        (apart / best - 1.0).abs() < 2e-3,
-        "{apart} where {best} is known"
-    );
+    assert!((apart / best - 1.0).abs() < 2e-3, "{apart} where {best} is known");
     assert_eq!(found(&axis, 1), Err(ExciteError::Inseparable));
 }

@@ -23,9 +23,7 @@ fn run() -> Result<String, String> {
 
     let mut arguments = std::env::args_os().skip(1);
     let (Some(target), None) = (arguments.next(), arguments.next()) else {
-        return Err(
-            "expected one argument: the path of the page to write, such as `try.html`".to_owned(),
-        );
+        return Err("expected one argument: the path of the page to write, such as `try.html`".to_owned());
     };
     let program = std::env::current_exe().map_err(|error| error.to_string())?;
     let builds = program.ancestors().nth(2).unwrap_or(&program);

@@ -108,22 +108,14 @@ impl Hidden {
     }
 }
 
-fn effect(
-    plant: &SpidermillPlant,
-    kind: &str,
-    at: &str,
-    values: &[(&str, f64)],
-) -> Result<RigEffect, String> {
+fn effect(plant: &SpidermillPlant, kind: &str, at: &str, values: &[(&str, f64)]) -> Result<RigEffect, String> {
     let made = plant.rig.effect(kind, &[at], values);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
 
 /// Viscous and Coulomb friction of a drive that the model knows.
 fn draw_friction(random: &mut CaseRandom) -> [f64; 2] {
-    [
-        random.log_between(80.0, 250.0),
-        random.log_between(12.0, 40.0),
-    ]
+    [random.log_between(80.0, 250.0), random.log_between(12.0, 40.0)]
 }
 
 /// The kind of a case; all of them come round one after the other.
@@ -159,12 +151,7 @@ impl Drawn {
     }
 
     /// A case of a kind, with sizes as drawn.
-    fn of(
-        kind: &'static str,
-        number: u64,
-        random: &mut CaseRandom,
-        plant: &SpidermillPlant,
-    ) -> Self {
+    fn of(kind: &'static str, number: u64, random: &mut CaseRandom, plant: &SpidermillPlant) -> Self {
         let side = random.below(2);
         let [here, there] = [DRIVES[side], DRIVES[1 - side]];
         let (main, besides) = kind.split_once('+').unwrap_or(("", kind));
@@ -247,8 +234,7 @@ impl Drawn {
         ];
         let is_known = !plain.contains(&kind) && law.as_ref().is_none_or(Law::has_known_friction);
         let known = is_known.then(|| [(); 2].map(|()| draw_friction(random)));
-        let courses =
-            [(); 2].map(|()| DrawnCourse::draw(random, plant.limits(), CourseRepeats::Once));
+        let courses = [(); 2].map(|()| DrawnCourse::draw(random, plant.limits(), CourseRepeats::Once));
         Self {
             number,
             known,
@@ -262,15 +248,9 @@ impl Drawn {
     }
 
     /// Effects of the rig: those that are hidden, and with `known` friction times a factor.
-    pub(crate) fn effects(
-        &self,
-        plant: &SpidermillPlant,
-        friction: f64,
-    ) -> Result<Vec<RigEffect>, String> {
+    pub(crate) fn effects(&self, plant: &SpidermillPlant, friction: f64) -> Result<Vec<RigEffect>, String> {
         let there = self.hidden.iter().filter(|one| !one.is_of_recording());
-        let mut effects = there
-            .map(|one| one.effect(plant))
-            .collect::<Result<Vec<_>, _>>()?;
+        let mut effects = there.map(|one| one.effect(plant)).collect::<Result<Vec<_>, _>>()?;
         if friction > 0.0 {
             effects.extend(self.friction(plant, friction)?);
         }
@@ -278,11 +258,7 @@ impl Drawn {
     }
 
     /// The friction that the model knows.
-    pub(crate) fn friction(
-        &self,
-        plant: &SpidermillPlant,
-        factor: f64,
-    ) -> Result<Vec<RigEffect>, String> {
+    pub(crate) fn friction(&self, plant: &SpidermillPlant, factor: f64) -> Result<Vec<RigEffect>, String> {
         let mut effects = Vec::new();
         for (at, [viscous, coulomb]) in DRIVES.iter().zip(self.known.unwrap_or_default()) {
             let one = |kind, symbol, x| effect(plant, kind, at, &[(symbol, factor * x)]);

@@ -63,9 +63,8 @@ pub(crate) fn judge(truth: &Value, answer: &Value) -> Mark {
     let has = |name: &str| list(&truth["verdict"][name]).any(|one| one == verdict);
     let is_right = has("right") || names_disturbance && named.iter().any(|one| also.contains(one));
     let finds_all = there.iter().all(|one| named.contains(one));
-    let says_where = list(&truth["law"]["at"]).all(|place| {
-        verdict != "unexplained" || list(&answer["where"]).any(|one| one["channel"] == *place)
-    });
+    let says_where = list(&truth["law"]["at"])
+        .all(|place| verdict != "unexplained" || list(&answer["where"]).any(|one| one["channel"] == *place));
     if is_right && finds_all && says_where && (names_disturbance || !must) {
         return if is_silent(truth, answer, names_disturbance) {
             Mark::Wrong
@@ -85,9 +84,7 @@ pub(crate) fn judge(truth: &Value, answer: &Value) -> Mark {
 /// Whether an answer is content with an error on the check run above twice the true noise and names nothing that makes it.
 fn is_silent(truth: &Value, answer: &Value, names_disturbance: bool) -> bool {
     let floor = truth["runs"]["check"]["floor"]["relative"].as_f64();
-    let last = list(&answer["steps"])
-        .last()
-        .and_then(|step| step["check"].as_f64());
+    let last = list(&answer["steps"]).last().and_then(|step| step["check"].as_f64());
     let is_above = matches!((floor, last), (Some(floor), Some(last)) if last > 2.0 * floor);
     answer["verdict"] != "unexplained" && is_above && !names_disturbance
 }
@@ -104,9 +101,7 @@ fn names(truth: &Value, answer: &Value) -> bool {
         })
         .collect();
     list(&truth["named_by"]).any(|pattern| {
-        let pattern = RegexBuilder::new(&text(pattern))
-            .case_insensitive(true)
-            .build();
+        let pattern = RegexBuilder::new(&text(pattern)).case_insensitive(true).build();
         pattern.is_ok_and(|pattern| said.iter().any(|one| pattern.is_match(one)))
     })
 }
@@ -141,9 +136,7 @@ pub(crate) fn summary(answer: &Value) -> String {
 
 fn placed(effect: &Value) -> Vec<Placed> {
     let kind = text(&effect["kind"]);
-    list(&effect["at"])
-        .map(|place| (kind.clone(), text(place)))
-        .collect()
+    list(&effect["at"]).map(|place| (kind.clone(), text(place))).collect()
 }
 
 fn list(value: &Value) -> impl DoubleEndedIterator<Item = &Value> {

@@ -106,10 +106,7 @@ impl Law {
             What::Memory => "friction with memory",
         };
         let Self { size, shape, .. } = self;
-        format!(
-            "{words} at {} (size {size}, shape {shape})",
-            DRIVES[self.at]
-        )
+        format!("{words} at {} (size {size}, shape {shape})", DRIVES[self.at])
     }
 
     pub(crate) fn named_by(&self) -> Vec<String> {

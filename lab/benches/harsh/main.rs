@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, ProgramFault, TestedProgram, in_project, read, remove_folder,
-    run_benchmark, scratch_folder, write,
+    BenchmarkOptions, BenchmarkUsage, ProgramFault, TestedProgram, in_project, read, remove_folder, run_benchmark,
+    scratch_folder, write,
 };
 use modelmill_lab::plant::SpidermillPlant;
 use modelmill_lab::record::FILES;
@@ -65,8 +65,7 @@ fn run(options: &BenchmarkOptions) -> Result<(), String> {
             score.ask(&program, &scratch, &place)?;
         }
     } else {
-        let entries =
-            std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let mut cases: Vec<PathBuf> = entries
             .filter_map(|entry| Some(entry.ok()?.path()))
             .filter(|path| path.join("truth.json").is_file())
@@ -137,8 +136,8 @@ impl Score {
     /// Asks about the case of a folder; models lie in another.
     fn ask(&mut self, program: &TestedProgram, models: &Path, case: &Path) -> Result<(), String> {
         let path = case.join("truth.json");
-        let truth: Value = serde_json::from_str(&read(&path)?)
-            .map_err(|error| format!("{}: {error}", path.display()))?;
+        let truth: Value =
+            serde_json::from_str(&read(&path)?).map_err(|error| format!("{}: {error}", path.display()))?;
         let model = truth["model"].as_str().unwrap_or("spidermill");
         let model = models.join(format!("{model}.toml"));
         let [fit, check] = FILES.map(|file| [case.join(file)]);

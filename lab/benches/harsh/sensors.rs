@@ -98,10 +98,7 @@ impl Fault {
             "noise-fast" => Self::Coloured(size(15.0, 40.0)),
             "noise-medium" => Self::Coloured(size(3.0, 8.0)),
             "noise-slow" => Self::Coloured(size(0.5, 2.0)),
-            "hum" => Self::Hum(
-                [50.0, 60.0][usize::from(size(1.0, 2.0) > 1.41)],
-                size(3.0, 10.0),
-            ),
+            "hum" => Self::Hum([50.0, 60.0][usize::from(size(1.0, 2.0) > 1.41)], size(3.0, 10.0)),
             "outliers" => Self::Outliers(size(0.002, 0.01), size(80.0, 400.0)),
             "quantised-coarse" => Self::Steps(size(8.0, 30.0)),
             "jitter-stamped" => Self::Uneven {
@@ -177,10 +174,7 @@ impl Fault {
                 | Self::Outliers(..)
                 | Self::Steps(_)
                 | Self::Late { drive: None, .. }
-                | Self::Uneven {
-                    is_stamped: true,
-                    ..
-                }
+                | Self::Uneven { is_stamped: true, .. }
         )
     }
 
@@ -188,10 +182,7 @@ impl Fault {
     pub(crate) fn is_of_positions(&self) -> bool {
         matches!(
             self,
-            Self::EccentricJoint { .. }
-                | Self::EccentricScrew { .. }
-                | Self::Backlash { .. }
-                | Self::Uneven { .. }
+            Self::EccentricJoint { .. } | Self::EccentricScrew { .. } | Self::Backlash { .. } | Self::Uneven { .. }
         )
     }
 
@@ -207,24 +198,18 @@ impl Fault {
             Self::Uneven { .. } => one("time stamps?|clock|jitter|uneven"),
             Self::Late { drive: Some(d), .. } => {
                 let d = drive(d);
-                vec![format!(
-                    "(late|delay)[^.]{{0,60}}{d}|{d}[^.]{{0,60}}(late|delay)"
-                )]
+                vec![format!("(late|delay)[^.]{{0,60}}{d}|{d}[^.]{{0,60}}(late|delay)")]
             }
             Self::Lag(_) => one(r"low-?pass|\blag(s|ging)?\b|bandwidth"),
             Self::Scale { .. } => one(r"\bscale\b|\bgain\b|calibrat"),
             Self::OffsetDrift { .. } => one("drift|creep"),
-            Self::Fades(_) => one(
-                "drift|fad(e|es|ing)|warm|with time|in time|over time|during the (run|recording)",
-            ),
+            Self::Fades(_) => one("drift|fad(e|es|ing)|warm|with time|in time|over time|during the (run|recording)"),
             Self::OtherDay(_) => one(between),
             Self::Payload(_) => vec![format!("{between}|payload")],
-            Self::Push { .. } => {
-                one(r"contact|push|collision|\bevent\b|burst|only (between|from|around) t")
+            Self::Push { .. } => one(r"contact|push|collision|\bevent\b|burst|only (between|from|around) t"),
+            Self::EccentricJoint { .. } | Self::EccentricScrew { .. } => {
+                one("encoder|eccentric|reading of .{0,12}theta|position error|error of (the )?position")
             }
-            Self::EccentricJoint { .. } | Self::EccentricScrew { .. } => one(
-                "encoder|eccentric|reading of .{0,12}theta|position error|error of (the )?position",
-            ),
             Self::Backlash { .. } => one(r"backlash|lost motion|\bplay\b"),
             _ => Vec::new(),
         }
@@ -234,12 +219,8 @@ impl Fault {
     pub(crate) fn also(&self) -> Vec<[String; 2]> {
         let place = |kind: &str, at: &str| [kind.to_owned(), at.to_owned()];
         match self {
-            Self::Late { drive: Some(d), .. } => ["time_delay", "force_lag"]
-                .map(|kind| place(kind, DRIVES[*d]))
-                .into(),
-            Self::Lag(_) => ["force", DRIVES[0], DRIVES[1]]
-                .map(|at| place("force_lag", at))
-                .into(),
+            Self::Late { drive: Some(d), .. } => ["time_delay", "force_lag"].map(|kind| place(kind, DRIVES[*d])).into(),
+            Self::Lag(_) => ["force", DRIVES[0], DRIVES[1]].map(|at| place("force_lag", at)).into(),
             Self::Scale { drive, .. } => vec![place("drive_gain", DRIVES[*drive])],
             Self::Backlash { at, .. } => vec![
                 place("backlash", DRIVES[*at]),
@@ -261,16 +242,10 @@ impl Fault {
 }
 
 /// A recording as text, and its true noise relative to the forces.
-pub(crate) fn record(
-    case: &Drawn,
-    plant: &SpidermillPlant,
-    seed: u64,
-    which: usize,
-) -> Result<(String, f64), String> {
+pub(crate) fn record(case: &Drawn, plant: &SpidermillPlant, seed: u64, which: usize) -> Result<(String, f64), String> {
     let course = &case.courses[which];
     let duration = f64::from(case.periods) * course.duration;
-    let stream =
-        |purpose: u64| CaseRandom::new(seed, case.number, 10 + 20 * which as u64 + purpose);
+    let stream = |purpose: u64| CaseRandom::new(seed, case.number, 10 + 20 * which as u64 + purpose);
     let mut clock = stream(0);
     let mut stamps: Vec<f64> = Vec::new();
     while stamps.len() as f64 <= RATE * duration {
@@ -294,10 +269,7 @@ pub(crate) fn record(
     let readings = readings(case, &along);
     let mut noises: Vec<CaseRandom> = (1..=4).map(stream).collect();
     let mut memories = [0.0; 2].map(|_: f64| noises[2].normal());
-    let phase = [
-        noises[2].uniform_between(0.0, TAU),
-        noises[3].uniform_between(0.0, TAU),
-    ];
+    let phase = [noises[2].uniform_between(0.0, TAU), noises[3].uniform_between(0.0, TAU)];
     let (mut errors, mut measured) = (Vec::new(), Vec::new());
     for (i, time) in stamps.iter().enumerate() {
         let _ = write!(csv, "{time:.9}");
@@ -437,9 +409,7 @@ fn forces(
 }
 
 fn payload(plant: &SpidermillPlant, mass: f64) -> Result<modelmill_rig::RigEffect, String> {
-    let made = plant
-        .rig
-        .effect("point_mass", &["R3m_right"], &[("m", mass)]);
+    let made = plant.rig.effect("point_mass", &["R3m_right"], &[("m", mass)]);
     made.map_err(|faults| faults.iter().map(ToString::to_string).collect())
 }
 
@@ -453,31 +423,20 @@ fn weight(plant: &SpidermillPlant, q: &[f64]) -> Result<Vec<f64>, String> {
     let mut tracker = RigTracker::new(&plant.rig).map_err(|error| error.to_string())?;
     let motion = tracker.follow(&still).map_err(|error| error.to_string())?;
     let mut rig = plant.rig.clone();
-    let of = |rig: &modelmill_rig::Rig| {
-        modelmill_rig::forces(rig, &motion).map_err(|error| error.to_string())
-    };
+    let of = |rig: &modelmill_rig::Rig| modelmill_rig::forces(rig, &motion).map_err(|error| error.to_string());
     rig.effects = Vec::new();
     let without = of(&rig)?;
     rig.effects = vec![payload(plant, 1.0)?];
     let with = of(&rig)?;
     let gravity = 9.81;
-    Ok(with
-        .iter()
-        .zip(without)
-        .map(|(a, b)| (a - b) / gravity)
-        .collect())
+    Ok(with.iter().zip(without).map(|(a, b)| (a - b) / gravity).collect())
 }
 
 /// Positions as the encoders would read them without noise, `[sample][coordinate]`.
 fn readings(case: &Drawn, along: &PlantMotion) -> Vec<Vec<f64>> {
     let mut readings: Vec<Vec<f64>> = along.states.iter().map(|state| state.q.clone()).collect();
     match case.fault {
-        Fault::EccentricJoint {
-            at,
-            by,
-            times,
-            phase,
-        } => {
+        Fault::EccentricJoint { at, by, times, phase } => {
             for q in &mut readings {
                 q[at] += by * libm::sin(times * q[at] + phase);
             }

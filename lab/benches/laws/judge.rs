@@ -14,8 +14,7 @@ const MOST: f64 = 0.9;
 const TRIED: usize = 3;
 /// Words that are no variables.
 const WORDS: [&str; 13] = [
-    "sin", "cos", "exp", "abs", "sign", "sqrt", "tanh", "pi", "dahl", "bouc_wen", "slip", "max",
-    "e",
+    "sin", "cos", "exp", "abs", "sign", "sqrt", "tanh", "pi", "dahl", "bouc_wen", "slip", "max", "e",
 ];
 
 /// How a case went.
@@ -57,8 +56,7 @@ pub(crate) fn judge(
         let mut tried = 0;
         for (k, one) in std::iter::once(law).chain(others).enumerate() {
             let has_place = text(&one["at"][0]) == wanted.at;
-            if !has_place || variables(text(&one["expression"])) != *wanted.words || tried == TRIED
-            {
+            if !has_place || variables(text(&one["expression"])) != *wanted.words || tried == TRIED {
                 continue;
             }
             tried += 1;
@@ -102,13 +100,7 @@ fn variables(expression: &str) -> Vec<String> {
 }
 
 /// The model with the effects that the answer has beside a law; those that `add` does not take stay out.
-fn with_effects(
-    program: &TestedProgram,
-    model: &Path,
-    folder: &Path,
-    answer: &Value,
-    law: &Value,
-) -> PathBuf {
+fn with_effects(program: &TestedProgram, model: &Path, folder: &Path, answer: &Value, law: &Value) -> PathBuf {
     let mut file = model.to_owned();
     let same = |a: &Value, b: &Value| a["kind"] == b["kind"] && a["at"] == b["at"];
     let found = answer["effects"].as_array().into_iter().flatten();
@@ -118,18 +110,9 @@ fn with_effects(
             continue;
         }
         let next = folder.join(format!("with-{k}.toml"));
-        let at: Vec<&str> = effect["at"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .map(text)
-            .collect();
+        let at: Vec<&str> = effect["at"].as_array().into_iter().flatten().map(text).collect();
         let mut args: Vec<OsString> = vec!["add".into(), file.clone().into()];
-        args.extend([
-            text(&effect["kind"]).into(),
-            "--at".into(),
-            at.join(",").into(),
-        ]);
+        args.extend([text(&effect["kind"]).into(), "--at".into(), at.join(",").into()]);
         for value in effect["estimates"].as_array().into_iter().flatten() {
             let value = format!("{}={}", text(&value["name"]), value["value"]);
             args.extend(["--set".into(), value.into()]);
@@ -155,12 +138,7 @@ fn goes(
     let library = folder.join("laws.toml");
     let with = folder.join("with-law.toml");
     write(&library, text(&law["entry"]))?;
-    let places: Vec<&str> = law["places"]
-        .as_array()
-        .into_iter()
-        .flatten()
-        .map(text)
-        .collect();
+    let places: Vec<&str> = law["places"].as_array().into_iter().flatten().map(text).collect();
     let places = places.join(",");
     let os = |text: &'static str| OsStr::new(text);
     let args = [
@@ -191,12 +169,8 @@ fn goes(
             probe.as_os_str(),
             os("--json"),
         ];
-        let fit = program
-            .run_for_json(&args)
-            .map_err(|fault| fault.whole_complaint())?;
-        fit["fit"]["nrms"]
-            .as_f64()
-            .ok_or_else(|| "no `nrms`".to_owned())
+        let fit = program.run_for_json(&args).map_err(|fault| fault.whole_complaint())?;
+        fit["fit"]["nrms"].as_f64().ok_or_else(|| "no `nrms`".to_owned())
     };
     Ok(1.0 - (error(&with)? / error(model)?).powi(2))
 }

@@ -17,8 +17,7 @@ use judge::{Marked, Wanted, judge};
 use modelmill_lab::coloured::{SpectrumFall, noise};
 use modelmill_lab::course::{CourseRepeats, DrawnCourse};
 use modelmill_lab::harness::{
-    BenchmarkOptions, BenchmarkUsage, TestedProgram, WORKERS, folder_of_case, run_benchmark,
-    work_off, write,
+    BenchmarkOptions, BenchmarkUsage, TestedProgram, WORKERS, folder_of_case, run_benchmark, work_off, write,
 };
 use modelmill_lab::random::{CaseRandom, three_digits};
 use modelmill_lab::record::{ENCODER_NOISE, encoder_step};
@@ -54,18 +53,11 @@ const PLANTED: [(Law, On, Places); 22] = {
     use Law as L;
     use On::{Arm, SpiderMill};
     const CROSSED: &[(&str, &str)] = &[("spindle_right", "theta1"), ("spindle_left", "theta2")];
-    const DRIVES: &[(&str, &str)] = &[
-        ("spindle_left", "spindle_right"),
-        ("spindle_right", "spindle_left"),
-    ];
+    const DRIVES: &[(&str, &str)] = &[("spindle_left", "spindle_right"), ("spindle_right", "spindle_left")];
     const PASSIVE: &[(&str, &str)] = &[("gamma1", ""), ("gamma2", "")];
     const SINGLE: &[(&str, &str)] = &[("spindle_left", ""), ("spindle_right", "")];
     const JOINTS: &[(&str, &str)] = &[("joint1", ""), ("joint2", ""), ("joint3", "")];
-    const PAIRS: &[(&str, &str)] = &[
-        ("joint2", "joint3"),
-        ("joint3", "joint2"),
-        ("joint1", "joint2"),
-    ];
+    const PAIRS: &[(&str, &str)] = &[("joint2", "joint3"), ("joint3", "joint2"), ("joint1", "joint2")];
     [
         (L::Coupling, SpiderMill, CROSSED),
         (L::ProductOfRates, SpiderMill, DRIVES),
@@ -149,8 +141,7 @@ const ARM: &str = "puma560.toml";
 
 fn report(cases: &[Case], done: &[Done]) -> String {
     let mut text = String::new();
-    let (mut shown, mut unexplained, mut first, mut right, mut ties, mut proposals) =
-        (0, 0, 0, 0, 0, 0);
+    let (mut shown, mut unexplained, mut first, mut right, mut ties, mut proposals) = (0, 0, 0, 0, 0, 0);
     for (case, done) in cases.iter().zip(done) {
         let _ = writeln!(
             text,
@@ -198,12 +189,7 @@ fn report(cases: &[Case], done: &[Done]) -> String {
 }
 
 /// Draws a case, records it, asks for a diagnosis and marks it.
-fn one(
-    case: &Case,
-    machine: &Machine,
-    program: &TestedProgram,
-    folder: &Path,
-) -> Result<Done, String> {
+fn one(case: &Case, machine: &Machine, program: &TestedProgram, folder: &Path) -> Result<Done, String> {
     let (law, _, places) = PLANTED[case.number];
     let stream = |purpose: u64| CaseRandom::new(case.seed, 7000 + case.number as u64, purpose);
     let mut random = stream(0);
@@ -242,11 +228,7 @@ fn one(
     let how = format!(
         "{}, {}, noise {:.2} % {colour}",
         repeats.word(),
-        if full {
-            "full states"
-        } else {
-            "positions only"
-        },
+        if full { "full states" } else { "positions only" },
         100.0 * share
     );
     let Some((planted, error)) = planted else {
@@ -334,9 +316,7 @@ fn sized(
     let felt: Vec<usize> = (0..added.len()).filter(|d| rms(&added[*d]) > 0.0).collect();
     let on_felt = |columns: &[f64]| -> f64 {
         let n = scene.times.len();
-        let parts = felt
-            .iter()
-            .flat_map(|d| columns[d * n..(d + 1) * n].to_vec());
+        let parts = felt.iter().flat_map(|d| columns[d * n..(d + 1) * n].to_vec());
         rms(&parts.collect::<Vec<f64>>())
     };
     let of_law = scaled(scene, deviations, &added.concat());

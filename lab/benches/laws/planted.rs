@@ -93,12 +93,7 @@ impl Law {
     /// Which variables of the place it has, in the order of its words: position, rate, acceleration, load.
     fn own(self) -> &'static [usize] {
         match self {
-            Self::Coupling
-            | Self::ProductOfRates
-            | Self::Fan
-            | Self::Valve
-            | Self::Thickening
-            | Self::Film => &[1],
+            Self::Coupling | Self::ProductOfRates | Self::Fan | Self::Valve | Self::Thickening | Self::Film => &[1],
             Self::RubsWithOther | Self::Hose => &[],
             Self::DragByPlace | Self::PreloadByPlace => &[0, 1],
             Self::Stop | Self::Bumper | Self::CubicSpring | Self::Magnet | Self::Hysteresis => &[0],
@@ -168,23 +163,17 @@ impl Planted {
         let of = reference.place(&self.at)?;
         let other = self.other.as_ref().map(|o| scene.place(o)).transpose()?;
         let values = self.values(place, of, other);
-        let scaled = place.force.iter().map(|force| {
-            force
-                .iter()
-                .zip(&values)
-                .map(|(f, x)| self.size * f * x)
-                .collect()
-        });
+        let scaled = place
+            .force
+            .iter()
+            .map(|force| force.iter().zip(&values).map(|(f, x)| self.size * f * x).collect());
         Ok(scaled.collect())
     }
 
     fn values(&self, place: &Place, reference: &Place, other: Option<&Place>) -> Vec<f64> {
         let [low, high] = ends(&reference.position);
         let travel = high - low;
-        let fastest = ends(&reference.rate)
-            .map(f64::abs)
-            .into_iter()
-            .fold(0.0, f64::max);
+        let fastest = ends(&reference.rate).map(f64::abs).into_iter().fold(0.0, f64::max);
         let [p, r] = self.shape;
         let at = |part: f64| low + part * travel;
         let sign = |z: f64| if z == 0.0 { 0.0 } else { z.signum() };
@@ -233,9 +222,7 @@ impl Planted {
 
 fn ends(z: &[f64]) -> [f64; 2] {
     z.iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
-            [a.min(*z), b.max(*z)]
-        })
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(*z), b.max(*z)])
 }
 
 /// The stretch of a spring that drags a block, at most one.

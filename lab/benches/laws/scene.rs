@@ -123,11 +123,7 @@ fn by_drive(rows: &[f64], drives: usize) -> Vec<Vec<f64>> {
 }
 
 fn words(position: &str, base: &str) -> [String; 3] {
-    [
-        position.to_owned(),
-        format!("{base}_d"),
-        format!("{base}_dd"),
-    ]
+    [position.to_owned(), format!("{base}_d"), format!("{base}_dd")]
 }
 
 fn spidermill(plant: &SpidermillPlant, course: &DrawnCourse, rate: f64) -> Result<Scene, String> {
@@ -168,12 +164,7 @@ fn spidermill(plant: &SpidermillPlant, course: &DrawnCourse, rate: f64) -> Resul
     let base = along.base(&plant.derivation)?;
     let mut library = library(&along);
     for joint in JOINTS {
-        for kind in [
-            "spring",
-            "counterbalance",
-            "drive_inertia",
-            "quadratic_friction",
-        ] {
+        for kind in ["spring", "counterbalance", "drive_inertia", "quadratic_friction"] {
             let at = PlacedEffect::new(kind, &[joint]);
             library.extend(columns(&along, &at, 1.0, &[]).unwrap_or_default());
         }
@@ -210,9 +201,7 @@ fn arm(model: &Model, course: &DrawnCourse, rate: f64) -> Result<Scene, String> 
     };
     let evaluator = ModelEvaluator::new(&model.derivation);
     let fault = |fault| format!("{fault:?}");
-    let plain = evaluator
-        .inverse_dynamics(&states, &model.nominal)
-        .map_err(fault)?;
+    let plain = evaluator.inverse_dynamics(&states, &model.nominal).map_err(fault)?;
     let regressor = evaluator.regressor(&states).map_err(fault)?;
     let drives = model.drives();
     let base = (0..regressor.ncols()).map(|k| {

@@ -33,12 +33,7 @@ fn scale(limit: f64) -> PanelStyle<'static> {
 }
 
 /// Angles of a trajectory around their means, and the forces along it.
-pub(crate) fn motion(
-    title: &str,
-    periodic: &PeriodicTrajectory,
-    along: &TreatmentRun,
-    drives: &[String],
-) -> String {
+pub(crate) fn motion(title: &str, periodic: &PeriodicTrajectory, along: &TreatmentRun, drives: &[String]) -> String {
     let mut figure = SvgFigure::new(title, &along.time);
     // Angles relative to their means, so that both cranks have one scale.
     let angles: DriveColumns = periodic
@@ -46,8 +41,7 @@ pub(crate) fn motion(
         .iter()
         .map(|one| {
             let time = along.time.iter();
-            time.map(|t| (one.at_time(*t)[0] - one.offset).to_degrees())
-                .collect()
+            time.map(|t| (one.at_time(*t)[0] - one.offset).to_degrees()).collect()
         })
         .collect();
     let limit = round_limit(&[&angles]);
@@ -84,25 +78,15 @@ pub(crate) fn errors(title: &str, along: &TreatmentRun, drives: &[String]) -> St
     let force = round_limit(&[&along.measured]);
     let error = round_limit(&[&calculated[0], &calculated[1], &estimated[0], &estimated[1]]);
     for (d, drive) in drives.iter().enumerate() {
-        figure.panel_with(
-            &format!("{drive}, N"),
-            &[("rig", &along.measured[d])],
-            &scale(force),
-        );
+        figure.panel_with(&format!("{drive}, N"), &[("rig", &along.measured[d])], &scale(force));
         figure.panel_with(
             &format!("{drive}: error of the paper's treatment, N"),
-            &[
-                ("calculated", &calculated[0][d]),
-                ("estimated", &estimated[0][d]),
-            ],
+            &[("calculated", &calculated[0][d]), ("estimated", &estimated[0][d])],
             &scale(error),
         );
         figure.panel_with(
             &format!("{drive}: error of the consistent treatment, N"),
-            &[
-                ("calculated", &calculated[1][d]),
-                ("estimated", &estimated[1][d]),
-            ],
+            &[("calculated", &calculated[1][d]), ("estimated", &estimated[1][d])],
             &scale(error),
         );
     }
@@ -117,25 +101,14 @@ pub(crate) fn decomposition(title: &str, along: &TreatmentRun, drives: &[String]
     // One scale for the three panels of every drive.
     let limit = round_limit(&[&error, &placement]);
     for (d, drive) in drives.iter().enumerate() {
-        let rest: Vec<f64> = error[d]
-            .iter()
-            .zip(&placement[d])
-            .map(|(e, p)| e - p)
-            .collect();
+        let rest: Vec<f64> = error[d].iter().zip(&placement[d]).map(|(e, p)| e - p).collect();
         // The error, its explanation from the models alone, and the difference.
         for (what, values) in [
             ("error of the paper's treatment, rig minus model", &error[d]),
-            (
-                "force of the misplaced m4, from the models alone",
-                &placement[d],
-            ),
+            ("force of the misplaced m4, from the models alone", &placement[d]),
             ("error minus this force", &rest),
         ] {
-            figure.panel_with(
-                &format!("{drive}: {what}, N"),
-                &[("", values)],
-                &scale(limit),
-            );
+            figure.panel_with(&format!("{drive}: {what}, N"), &[("", values)], &scale(limit));
         }
     }
     figure.finish()
@@ -211,11 +184,7 @@ pub(crate) fn base_parameter_positions(experiment: &PaperExperiment) -> String {
     let bottom = 70.0 + ROW * calculated.len() as f64;
     let mut body = String::new();
     // Vertical lines for calculated, consistent, and twice the distance.
-    for (share, label) in [
-        (0.0, "calculated"),
-        (1.0, "consistent"),
-        (2.0, "twice as far"),
-    ] {
+    for (share, label) in [(0.0, "calculated"), (1.0, "consistent"), (2.0, "twice as far")] {
         let _ = writeln!(
             body,
             r#"<line class="zero" x1="{0:.1}" x2="{0:.1}" y1="62" y2="{bottom:.1}"/><text x="{0:.1}" y="54" text-anchor="middle" class="scale">{label}</text>"#,
@@ -268,9 +237,7 @@ pub(crate) fn lengths(lengths: &[DistanceErrors], paper: [f64; 2]) -> String {
     let (top, height, left, width) = (60.0, 240.0, 80.0, 780.0);
     let most = 0.35;
     let (first, last) = match (lengths.first(), lengths.last()) {
-        (Some(first), Some(last)) if last.distance > first.distance => {
-            (first.distance, last.distance)
-        }
+        (Some(first), Some(last)) if last.distance > first.distance => (first.distance, last.distance),
         _ => return String::new(),
     };
     // Coordinates of the chart for a distance and an error.

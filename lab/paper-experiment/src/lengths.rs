@@ -9,7 +9,7 @@ use modelmill_identify::{PreparationRecord, PreparedRun};
 use crate::bundled;
 use crate::study::{DriveErrors, TreatmentRun};
 use modelmill::along;
-use modelmill::stretch::RecordingSegment;
+use modelmill::segment::RecordingSegment;
 use modelmill::{Host, Outcome};
 
 /// Number of samples of the period.
@@ -52,9 +52,7 @@ fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<Di
     // One period of the motion as a recording without forces.
     let motion = ExcitationMotion::sample(series, SAMPLES);
     let period = series.first().map_or(0.0, FourierSeries::period);
-    let time: Vec<f64> = (0..SAMPLES)
-        .map(|i| i as f64 * period / SAMPLES as f64)
-        .collect();
+    let time: Vec<f64> = (0..SAMPLES).map(|i| i as f64 * period / SAMPLES as f64).collect();
     let data = RecordingSegment::from(PreparedRun {
         file: format!("the test motion for b = {distance} m"),
         q: motion.q,
@@ -69,10 +67,7 @@ fn errors_at(host: &Host, series: &[FourierSeries], distance: f64) -> Outcome<Di
         prepared: PreparationRecord::default(),
         notes: Vec::new(),
     });
-    let (paper, consistent) = (
-        variant("spidermill-paper.toml")?,
-        variant("spidermill.toml")?,
-    );
+    let (paper, consistent) = (variant("spidermill-paper.toml")?, variant("spidermill.toml")?);
     let forces = [
         along::forces(&paper, &data, &paper.nominal)?,
         along::forces(&consistent, &data, &consistent.nominal)?,

@@ -98,10 +98,7 @@ impl PaperExperiment {
                 runs::run(&rig, &paper, verification, args.rate)?,
             )
         };
-        let benches = [
-            bench("spidermill-full.toml")?,
-            bench("spidermill-with-rods.toml")?,
-        ];
+        let benches = [bench("spidermill-full.toml")?, bench("spidermill-with-rods.toml")?];
         // The consistent parameters of the paper's model are determined along the identification run.
         let rig = bundled::rig("spidermill-full.toml")?;
         let data = runs::run(&rig, &paper, &trajectories[0], args.rate)?;
@@ -144,11 +141,7 @@ impl PaperExperiment {
                         row.extend((0..2).map(|d| percent(Some(along.errors(d, modelled).nrms))));
                     }
                     let remains = along.explained_error().remains;
-                    row.push(if t == 0 {
-                        percent(Some(remains))
-                    } else {
-                        String::new()
-                    });
+                    row.push(if t == 0 { percent(Some(remains)) } else { String::new() });
                     rows.push(row);
                 }
             }
@@ -201,11 +194,7 @@ impl PaperExperiment {
                     },
                 })
             };
-            let solutions: Vec<_> = bench
-                .physical
-                .iter()
-                .map(|one| one.values.clone())
-                .collect();
+            let solutions: Vec<_> = bench.physical.iter().map(|one| one.values.clone()).collect();
             json!({
                 "identification": run(0),
                 "verification": run(1),

@@ -8,9 +8,7 @@ use modelmill::text::svg::escape;
 
 /// The HTML of the page.
 pub(crate) fn render(experiment: &PaperExperiment) -> String {
-    let mut page = ExperimentPage(report::begin_page(
-        "The paper's experiment, reproduced and explained",
-    ));
+    let mut page = ExperimentPage(report::begin_page("The paper's experiment, reproduced and explained"));
     page.summary(experiment);
     page.method(experiment);
     page.table_2(experiment);

@@ -90,15 +90,9 @@ impl ExperimentPage {
         // Motion and forces of both runs.
         let drives = experiment.paper.drives();
         let runs = &experiment.benches[0].runs;
-        for (k, title) in ["Identification run", "Verification run"]
-            .into_iter()
-            .enumerate()
-        {
+        for (k, title) in ["Identification run", "Verification run"].into_iter().enumerate() {
             let svg = figures::motion(title, &experiment.trajectories[k], &runs[k], &drives);
-            self.figure(
-                &svg,
-                "Compare Fig. 6 and 7 of the paper, a to d. Rig without rods.",
-            );
+            self.figure(&svg, "Compare Fig. 6 and 7 of the paper, a to d. Rig without rods.");
         }
     }
 
@@ -142,14 +136,7 @@ impl ExperimentPage {
                 }
             }
             // Three measures of error for each of the two rigs.
-            let columns = [
-                "rig: mean",
-                "median",
-                "nrms",
-                "with rods: mean",
-                "median",
-                "nrms",
-            ];
+            let columns = ["rig: mean", "median", "nrms", "with rods: mean", "median", "nrms"];
             let mut head = vec!["run"];
             if t == 0 {
                 head.push("*paper: mean");
@@ -203,12 +190,7 @@ impl ExperimentPage {
             }
         }
         self.table(
-            &[
-                "run",
-                "correlation",
-                "residual error (2-norm)",
-                "explained (squares)",
-            ],
+            &["run", "correlation", "residual error (2-norm)", "explained (squares)"],
             &rows,
         );
         // Error, explanation and residual over time.
@@ -248,12 +230,7 @@ impl ExperimentPage {
         ));
         let name = drives.first().map_or("", String::as_str);
         self.figure(
-            &figures::peaks(
-                "Left spindle, verification run, rig as in Table 1",
-                along,
-                0,
-                name,
-            ),
+            &figures::peaks("Left spindle, verification run, rig as in Table 1", along, 0, name),
             "Compare Fig. 6 e of the paper.",
         );
     }

@@ -27,12 +27,7 @@ impl ExperimentPage {
         );
         // Estimates with the paper's treatment, without and with rods.
         let ours = [0, 1].map(|k| experiment.benches[k].fits[0].values());
-        let units: Vec<&str> = experiment
-            .paper
-            .base
-            .iter()
-            .map(|b| b.unit.as_str())
-            .collect();
+        let units: Vec<&str> = experiment.paper.base.iter().map(|b| b.unit.as_str()).collect();
         // Values that are zero up to rounding are printed as zero.
         let value = |x: f64| {
             if x.abs() < 1e-6 {
@@ -67,8 +62,7 @@ impl ExperimentPage {
         );
         // The change by the paper's own identification, explained by the misplaced mass along both runs.
         let runs = &experiment.benches[0].runs;
-        let changes =
-            [0, 1].map(|k| study::explain_error(&runs[k].printed_change(), &runs[k].placement()));
+        let changes = [0, 1].map(|k| study::explain_error(&runs[k].printed_change(), &runs[k].placement()));
         self.figure(
             &figures::base_parameter_positions(experiment),
             "0 is the value that the paper calculates from Table 1; 1 is the value of the same masses at one place. \
@@ -105,11 +99,7 @@ impl ExperimentPage {
              solutions are given.",
         );
         let parameters = &experiment.paper.derivation.mechanism.parameters;
-        let mut head = vec![
-            String::new(),
-            "nominal".to_owned(),
-            "*paper's estimate".to_owned(),
-        ];
+        let mut head = vec![String::new(), "nominal".to_owned(), "*paper's estimate".to_owned()];
         let names = ["rig", "with rods"];
         // One column per rig and real solution.
         let mut columns: Vec<&[f64]> = Vec::new();
@@ -225,22 +215,14 @@ impl ExperimentPage {
         self.paragraph("Coefficients of the trajectories, eq. (15), rad and rad/s:");
         let names = experiment.paper.active_coordinates();
         // One table per trajectory, with the coefficients as they were used.
-        for (periodic, run) in experiment
-            .trajectories
-            .iter()
-            .zip(["Identification", "Verification"])
-        {
+        for (periodic, run) in experiment.trajectories.iter().zip(["Identification", "Verification"]) {
             let means: Vec<String> = periodic
                 .series
                 .iter()
                 .zip(&names)
                 .map(|(series, name)| format!("mean of {name} {:.4}", series.offset))
                 .collect();
-            self.paragraph(&format!(
-                "{run}, period {} s, {}:",
-                periodic.period,
-                means.join(", ")
-            ));
+            self.paragraph(&format!("{run}, period {} s, {}:", periodic.period, means.join(", ")));
             // Two columns per coordinate: the coefficients mu and nu of every harmonic.
             let mut head = vec!["k".to_owned()];
             for name in &names {

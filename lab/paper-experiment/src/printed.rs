@@ -15,5 +15,4 @@ pub(crate) const ESTIMATED: [(&str, f64); 5] = [
 ];
 
 /// Table 2, per cent: `[calculated, estimated][left, right][identification, verification]`.
-pub(crate) const TABLE_2: [[[f64; 2]; 2]; 2] =
-    [[[9.90, 10.20], [9.08, 7.82]], [[3.33, 3.56], [3.30, 3.39]]];
+pub(crate) const TABLE_2: [[[f64; 2]; 2]; 2] = [[[9.90, 10.20], [9.08, 7.82]], [[3.33, 3.56], [3.30, 3.39]]];

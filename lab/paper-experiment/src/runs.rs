@@ -3,8 +3,8 @@
 use std::f64::consts::PI;
 
 use modelmill_identify::excite::{
-    ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options, condition_number,
-    excite, max_progress_steps,
+    ExcitationLimits, ExcitationMotion, ExcitationPlant, FourierSeries, Options, condition_number, excite,
+    max_progress_steps,
 };
 use modelmill_identify::{PreparationRecord, PreparedRun};
 use modelmill_rig::{Rig, RigState, Trajectory};
@@ -12,7 +12,7 @@ use modelmill_rig::{Rig, RigState, Trajectory};
 use modelmill::Model;
 use modelmill::excite::limits;
 use modelmill::excite::plant::ModelPlant;
-use modelmill::stretch::RecordingSegment;
+use modelmill::segment::RecordingSegment;
 use modelmill::{Error, Outcome};
 
 /// Inverse of the step to which coefficients are rounded, so that they can be printed and everybody can repeat the
@@ -36,20 +36,14 @@ pub(crate) struct PeriodicTrajectory {
 }
 
 /// Searches for a trajectory; it satisfies all limits with rounded coefficients.
-pub(crate) fn search(
-    model: &Model,
-    options: &Options,
-    message: &str,
-) -> Outcome<PeriodicTrajectory> {
+pub(crate) fn search(model: &Model, options: &Options, message: &str) -> Outcome<PeriodicTrajectory> {
     // Limits of the model file, for the active coordinates.
     let all_limits = limits::merged_limits(model, &[])?;
     let coordinates = limits::active_limits(model, &all_limits)?;
     let plant = ModelPlant::new(model, &all_limits);
-    let search = model
-        .host()
-        .run_job(message, max_progress_steps(options), |job| {
-            excite(&plant, &coordinates, options, &|more| job.flow(more))
-        })?;
+    let search = model.host().run_job(message, max_progress_steps(options), |job| {
+        excite(&plant, &coordinates, options, &|more| job.flow(more))
+    })?;
     let found = search.map_err(|error| Error::input(format!("{}: {error}", model.path)))?;
     // Rounding may exceed the limits slightly. The motion is then reduced in steps of 0.1 %.
     // The first factor with which the rounded trajectory is within all limits.
@@ -63,14 +57,9 @@ pub(crate) fn search(
             ))
         })?;
     // The condition number belongs to the rounded coefficients.
-    let motion = ExcitationMotion::sample(
-        &series,
-        modelmill_identify::excite::samples_per_period(options),
-    );
+    let motion = ExcitationMotion::sample(&series, modelmill_identify::excite::samples_per_period(options));
     Ok(PeriodicTrajectory {
-        condition_number: plant
-            .regressor(&motion)
-            .map_or(f64::INFINITY, |w| condition_number(&w)),
+        condition_number: plant.regressor(&motion).map_or(f64::INFINITY, |w| condition_number(&w)),
         series,
         period: options.period,
         start: found.start_condition_number,
@@ -92,11 +81,7 @@ fn round_coefficients(series: &[FourierSeries], factor: f64, period: f64) -> Vec
 }
 
 /// Whether a trajectory satisfies the limits of coordinates, rates and accelerations, and those of the plant.
-fn is_within_limits(
-    plant: &ModelPlant<'_>,
-    limits: &[ExcitationLimits],
-    series: &[FourierSeries],
-) -> bool {
+fn is_within_limits(plant: &ModelPlant<'_>, limits: &[ExcitationLimits], series: &[FourierSeries]) -> bool {
     // Extremes of a Fourier series and of its derivatives.
     let within = |one: &FourierSeries, limits: &ExcitationLimits| {
         let ranges = [Some(limits.position), limits.rate, limits.acceleration];
@@ -113,12 +98,7 @@ fn is_within_limits(
 
 /// Simulates a rig along a trajectory: exact states and forces, as of ideal sensors. Differences between them and a
 /// model are then errors of the model.
-pub(crate) fn run(
-    rig: &Rig,
-    model: &Model,
-    periodic: &PeriodicTrajectory,
-    rate: f64,
-) -> Outcome<RecordingSegment> {
+pub(crate) fn run(rig: &Rig, model: &Model, periodic: &PeriodicTrajectory, rate: f64) -> Outcome<RecordingSegment> {
     // Order of coordinates and drives in the rig for those of the model.
     let coordinates = model
         .active_coordinates()

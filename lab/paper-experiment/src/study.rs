@@ -9,7 +9,7 @@ use modelmill::Model;
 use modelmill::along;
 use modelmill::identify::{EstimatorOptions, Identification, identify, regression};
 use modelmill::interpret as table_1;
-use modelmill::stretch::RecordingSegment;
+use modelmill::segment::RecordingSegment;
 use modelmill::{Error, Outcome};
 
 /// Forces as `[drive][sample]`, N.
@@ -167,11 +167,7 @@ impl TreatmentRun {
         let rms = (force.iter().map(|y| y * y).sum::<f64>() / n).sqrt();
         let (mut count, mut part, mut all) = (0.0, 0.0, 0.0);
         // Counts samples near zero, and sums relative errors near zero and in total.
-        for (y, m) in force
-            .iter()
-            .zip(&modelled[drive])
-            .filter(|(y, _)| **y != 0.0)
-        {
+        for (y, m) in force.iter().zip(&modelled[drive]).filter(|(y, _)| **y != 0.0) {
             let relative = ((y - m) / y).abs();
             all += relative;
             if y.abs() < below * rms {
@@ -206,24 +202,17 @@ fn difference(a: &DriveColumns, b: &DriveColumns) -> DriveColumns {
 
 /// The paper's base parameters that give the forces of the consistent treatment. It is the special case in which the
 /// half masses are at the ends of the couplers, so least squares determines them without error.
-pub(crate) fn consistent_values(
-    paper: &Model,
-    consistent: &Model,
-    data: &RecordingSegment,
-) -> Outcome<Vec<f64>> {
+pub(crate) fn consistent_values(paper: &Model, consistent: &Model, data: &RecordingSegment) -> Outcome<Vec<f64>> {
     // The forces of the consistent model take the place of measured ones.
     let run = PreparedRun {
         force: Some(along::forces(consistent, data, &consistent.nominal)?),
         ..data.run.clone()
     };
-    Ok(regression::identify(
-        paper,
-        &[RecordingSegment::from(run)],
-        &[],
-        &EstimatorOptions::default(),
-    )?
-    .solution
-    .values)
+    Ok(
+        regression::identify(paper, &[RecordingSegment::from(run)], &[], &EstimatorOptions::default())?
+            .solution
+            .values,
+    )
 }
 
 /// The paper's base parameters for other values of some parameters, in the order of `p_min`.
@@ -249,10 +238,9 @@ fn physical(model: &Model, fit: &FitFile) -> Outcome<Vec<PhysicalSolution>> {
     // The equations of the base parameters, solved for the unknown physical parameters.
     let (system, _) = table_1::system(model, &unknown, &values, fit);
     match interpret(&system) {
-        Ok(
-            PhysicalInterpretation::Exact { solutions }
-            | PhysicalInterpretation::LeastSquares { solutions, .. },
-        ) => Ok(solutions),
+        Ok(PhysicalInterpretation::Exact { solutions } | PhysicalInterpretation::LeastSquares { solutions, .. }) => {
+            Ok(solutions)
+        }
         Ok(PhysicalInterpretation::Undetermined { .. }) => Ok(Vec::new()),
         Err(error) => Err(Error::input(format!("{}: {error}", model.path))),
     }

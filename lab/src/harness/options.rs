@@ -26,10 +26,7 @@ pub struct BenchmarkOptions {
 }
 
 /// Reads the command line of this process and runs a benchmark. Status 0 done, 1 failed, 2 wrong usage.
-pub fn run_benchmark(
-    usage: &BenchmarkUsage,
-    run: impl FnOnce(&BenchmarkOptions) -> Result<(), String>,
-) -> ExitCode {
+pub fn run_benchmark(usage: &BenchmarkUsage, run: impl FnOnce(&BenchmarkOptions) -> Result<(), String>) -> ExitCode {
     let options = match BenchmarkOptions::read(usage, std::env::args().skip(1)) {
         Ok(options) => options,
         Err(says) => {
@@ -48,15 +45,10 @@ pub fn run_benchmark(
 
 impl BenchmarkOptions {
     /// Reads arguments; fails with what is not known.
-    pub fn read(
-        usage: &BenchmarkUsage,
-        mut args: impl Iterator<Item = String>,
-    ) -> Result<Self, String> {
+    pub fn read(usage: &BenchmarkUsage, mut args: impl Iterator<Item = String>) -> Result<Self, String> {
         let known = usage.values.iter().chain(&[("program", "")]);
         let mut options = Self {
-            values: known
-                .map(|(name, usual)| (*name, (*usual).to_owned()))
-                .collect(),
+            values: known.map(|(name, usual)| (*name, (*usual).to_owned())).collect(),
             switches: Vec::new(),
             folder: None,
         };
@@ -78,9 +70,7 @@ impl BenchmarkOptions {
             }
             let of_name = options.values.iter_mut().find(|(known, _)| *known == name);
             let option = of_name.ok_or_else(|| format!("unknown argument `{arg}`"))?;
-            option.1 = args
-                .next()
-                .ok_or_else(|| format!("{arg} lacks its value"))?;
+            option.1 = args.next().ok_or_else(|| format!("{arg} lacks its value"))?;
         }
         Ok(options)
     }
@@ -94,15 +84,12 @@ impl BenchmarkOptions {
     /// The number of an option.
     pub fn number<T: FromStr>(&self, name: &str) -> Result<T, String> {
         let text = self.text(name);
-        text.parse()
-            .map_err(|_| format!("--{name}: `{text}` is no number"))
+        text.parse().map_err(|_| format!("--{name}: `{text}` is no number"))
     }
 
     /// The path of an option that was given.
     pub fn path(&self, name: &str) -> Option<&Path> {
-        Some(self.text(name))
-            .filter(|text| !text.is_empty())
-            .map(Path::new)
+        Some(self.text(name)).filter(|text| !text.is_empty()).map(Path::new)
     }
 
     /// Whether an option without a value was given.

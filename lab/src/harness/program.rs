@@ -57,9 +57,7 @@ impl ProgramFault {
 impl TestedProgram {
     /// A program that is there.
     pub fn new(path: &Path) -> Self {
-        Self {
-            path: path.to_owned(),
-        }
+        Self { path: path.to_owned() }
     }
 
     /// The program of this project, built with the profile of the benchmark. Cargo, which runs benchmarks, does nothing if it
@@ -82,15 +80,10 @@ impl TestedProgram {
         }
         // Cargo says where it puts things, in one JSON object per line.
         let said = String::from_utf8_lossy(&output.stdout);
-        let mut objects = said
-            .lines()
-            .filter_map(|line| serde_json::from_str::<Value>(line).ok());
+        let mut objects = said.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         let program = objects.find_map(|said| {
             let is_it = said["target"]["name"] == "modelmill";
-            said["executable"]
-                .as_str()
-                .filter(|_| is_it)
-                .map(PathBuf::from)
+            said["executable"].as_str().filter(|_| is_it).map(PathBuf::from)
         });
         let path = program.ok_or("cargo does not say where the program is")?;
         Ok(Self { path })
@@ -99,9 +92,7 @@ impl TestedProgram {
     /// What the program prints.
     pub fn run(&self, args: &[impl AsRef<OsStr>]) -> Result<String, ProgramFault> {
         let output = Command::new(&self.path).args(args).output();
-        let output = output.map_err(|error| {
-            ProgramFault::NotStarted(format!("{}: {error}", self.path.display()))
-        })?;
+        let output = output.map_err(|error| ProgramFault::NotStarted(format!("{}: {error}", self.path.display())))?;
         if output.status.success() {
             return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
         }
@@ -116,8 +107,7 @@ impl TestedProgram {
     /// What the program prints, as JSON.
     pub fn run_for_json(&self, args: &[impl AsRef<OsStr>]) -> Result<Value, ProgramFault> {
         let text = self.run(args)?;
-        serde_json::from_str(&text)
-            .map_err(|error| ProgramFault::Unreadable(format!("JSON: {error}")))
+        serde_json::from_str(&text).map_err(|error| ProgramFault::Unreadable(format!("JSON: {error}")))
     }
 
     /// What `diagnose MODEL --data FIT --check CHECK --json` prints, and how long it took.
@@ -141,20 +131,9 @@ impl TestedProgram {
     }
 
     /// The same for one recording each, read as far as it is scored; a fault is told in words.
-    pub fn diagnose(
-        &self,
-        model: &Path,
-        [fit, check]: &[PathBuf; 2],
-    ) -> (Result<ProgramAnswer, String>, Duration) {
-        let (answer, took) = self.diagnose_for_json(
-            model,
-            std::slice::from_ref(fit),
-            std::slice::from_ref(check),
-        );
+    pub fn diagnose(&self, model: &Path, [fit, check]: &[PathBuf; 2]) -> (Result<ProgramAnswer, String>, Duration) {
+        let (answer, took) = self.diagnose_for_json(model, std::slice::from_ref(fit), std::slice::from_ref(check));
         let answer = answer.map_err(|fault| fault.to_string());
-        (
-            answer.and_then(|value| ProgramAnswer::from_json(&value)),
-            took,
-        )
+        (answer.and_then(|value| ProgramAnswer::from_json(&value)), took)
     }
 }

@@ -18,17 +18,8 @@ fn plant() -> SpidermillPlant {
 fn column(csv: &str, name: &str) -> Vec<f64> {
     let mut lines = csv.lines();
     let header = lines.next().expect("a header");
-    let at = header
-        .split(',')
-        .position(|n| n == name)
-        .expect("the column");
-    let field = |line: &str| {
-        line.split(',')
-            .nth(at)
-            .expect("a field")
-            .parse()
-            .expect("a number")
-    };
+    let at = header.split(',').position(|n| n == name).expect("the column");
+    let field = |line: &str| line.split(',').nth(at).expect("a field").parse().expect("a number");
     lines.map(field).collect()
 }
 
@@ -71,11 +62,7 @@ fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
     let times = column(&recorded.csv, "t");
     let along = PlantMotion::new(&case.rig, &case.courses[0], times).expect("the same motion");
     let [left, right] = DRIVES.map(|drive| column(&recorded.csv, drive));
-    let measured: Vec<f64> = left
-        .into_iter()
-        .zip(right)
-        .flat_map(|(l, r)| [l, r])
-        .collect();
+    let measured: Vec<f64> = left.into_iter().zip(right).flat_map(|(l, r)| [l, r]).collect();
     let span = ColumnSpan::from_columns(along.base(&plant.derivation).expect("columns"));
     let left = norm(&span.rest(&measured));
     let share = left / norm(&measured) / recorded.floor;
@@ -88,10 +75,7 @@ fn a_recording_with_nothing_hidden_is_the_model_and_noise() {
 #[test]
 fn no_library_says_what_is_outside() {
     let plant = plant();
-    for number in (1..100)
-        .filter(|n| class_of(*n).0 == CaseClass::Outside)
-        .take(2)
-    {
+    for number in (1..100).filter(|n| class_of(*n).0 == CaseClass::Outside).take(2) {
         let case = HiddenCase::draw(&plant, SEED, number).expect("a case");
         let along = &case.coarse[0];
         let forces = case.forces(along, &case.courses[0]).expect("forces");

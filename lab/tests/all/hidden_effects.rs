@@ -38,10 +38,7 @@ fn said(verdict: &str, effects: &[(&str, &[&str], &[PlacedEffect])]) -> Value {
 
 /// The mark of an answer where claims leave `excess` of the true forces.
 fn mark(class: CaseClass, hidden: &[(&str, &[&str])], answer: &Value, excess: f64) -> AnswerMark {
-    let hidden: Vec<PlacedEffect> = hidden
-        .iter()
-        .map(|(k, at)| PlacedEffect::new(k, at))
-        .collect();
+    let hidden: Vec<PlacedEffect> = hidden.iter().map(|(k, at)| PlacedEffect::new(k, at)).collect();
     let answer = ProgramAnswer::from_json(answer).expect("the form of cli.md");
     judge(class, &hidden, None, &answer, &mut |_| excess)
 }
@@ -65,18 +62,9 @@ fn what_is_wrong_is_told_apart() {
     let hidden: &[(&str, &[&str])] = &[("viscous_friction", &[LEFT])];
     let answer = |effects| plainly(CaseClass::One, hidden, &said("missing_effect", effects));
     assert_eq!(answer(&[]), AnswerMark::Missed);
-    assert_eq!(
-        answer(&[("viscous_friction", &[RIGHT], &[])]),
-        AnswerMark::WrongPlace
-    );
-    assert_eq!(
-        answer(&[("coulomb_friction", &[LEFT], &[])]),
-        AnswerMark::WrongKind
-    );
-    assert_eq!(
-        answer(&[("viscous_friction", &[LEFT, RIGHT], &[])]),
-        AnswerMark::Extra
-    );
+    assert_eq!(answer(&[("viscous_friction", &[RIGHT], &[])]), AnswerMark::WrongPlace);
+    assert_eq!(answer(&[("coulomb_friction", &[LEFT], &[])]), AnswerMark::WrongKind);
+    assert_eq!(answer(&[("viscous_friction", &[LEFT, RIGHT], &[])]), AnswerMark::Extra);
     let two: &[(&str, &[&str])] = &[("viscous_friction", &[LEFT]), ("point_mass", &["R2m"])];
     let part = said("missing_effect", &[("point_mass", &["R2m"], &[])]);
     assert_eq!(plainly(CaseClass::Two, two, &part), AnswerMark::Partly);
@@ -84,25 +72,13 @@ fn what_is_wrong_is_told_apart() {
 
 #[test]
 fn shared_and_separate_are_alike() {
-    let separate: &[(&str, &[&str])] = &[
-        ("coulomb_friction", &[LEFT]),
-        ("coulomb_friction", &[RIGHT]),
-    ];
-    let shared = said(
-        "missing_effect",
-        &[("coulomb_friction", &[RIGHT, LEFT], &[])],
-    );
-    assert_eq!(
-        plainly(CaseClass::One, separate, &shared),
-        AnswerMark::Right
-    );
+    let separate: &[(&str, &[&str])] = &[("coulomb_friction", &[LEFT]), ("coulomb_friction", &[RIGHT])];
+    let shared = said("missing_effect", &[("coulomb_friction", &[RIGHT, LEFT], &[])]);
+    assert_eq!(plainly(CaseClass::One, separate, &shared), AnswerMark::Right);
     let both: &[(&str, &[&str])] = &[("coulomb_friction", &[LEFT, RIGHT])];
     let apart = said(
         "missing_effect",
-        &[
-            ("coulomb_friction", &[LEFT], &[]),
-            ("coulomb_friction", &[RIGHT], &[]),
-        ],
+        &[("coulomb_friction", &[LEFT], &[]), ("coulomb_friction", &[RIGHT], &[])],
     );
     assert_eq!(plainly(CaseClass::One, both, &apart), AnswerMark::Right);
 }
@@ -114,10 +90,7 @@ fn the_same_columns_by_other_names_are_alike() {
     };
     assert!(alike(
         &[("directional_coulomb_friction", &[LEFT])],
-        &[
-            ("coulomb_friction", &[LEFT], &[]),
-            ("force_offset", &[LEFT], &[])
-        ]
+        &[("coulomb_friction", &[LEFT], &[]), ("force_offset", &[LEFT], &[])]
     ));
     assert!(alike(
         &[("directional_viscous_friction", &[LEFT])],
@@ -158,16 +131,9 @@ fn an_alias_counts_where_it_is_named_and_nobody_could_do_better() {
     let offset: &[(&str, &[&str])] = &[("force_offset", &[LEFT])];
     let spring = said(
         "missing_effect",
-        &[(
-            "spring",
-            &[LEFT],
-            &[PlacedEffect::new("force_offset", &[LEFT])],
-        )],
+        &[("spring", &[LEFT], &[PlacedEffect::new("force_offset", &[LEFT])])],
     );
-    assert_eq!(
-        mark(CaseClass::One, offset, &spring, 0.0),
-        AnswerMark::WrongKind
-    );
+    assert_eq!(mark(CaseClass::One, offset, &spring, 0.0), AnswerMark::WrongKind);
     // A stand-in does not excuse what stands beside it.
     let more = said(
         "missing_effect",
@@ -176,10 +142,7 @@ fn an_alias_counts_where_it_is_named_and_nobody_could_do_better() {
             ("force_offset", &[RIGHT], &[]),
         ],
     );
-    assert_eq!(
-        mark(CaseClass::One, hidden, &more, 0.0),
-        AnswerMark::WrongKind
-    );
+    assert_eq!(mark(CaseClass::One, hidden, &more, 0.0), AnswerMark::WrongKind);
 }
 
 #[test]
@@ -189,23 +152,11 @@ fn nothing_and_what_is_outside_have_one_right_verdict_each() {
     let adequate_with_effect = said("adequate", &[("spring", &[LEFT], &[])]);
     let of = |class, answer: &Value| plainly(class, &[], answer);
     assert_eq!(of(CaseClass::None, &nothing("adequate")), AnswerMark::Right);
-    assert_eq!(
-        of(CaseClass::None, &nothing("unexplained")),
-        AnswerMark::FalseAlarm
-    );
+    assert_eq!(of(CaseClass::None, &nothing("unexplained")), AnswerMark::FalseAlarm);
     assert_eq!(of(CaseClass::None, &effect), AnswerMark::FalseAlarm);
-    assert_eq!(
-        of(CaseClass::None, &adequate_with_effect),
-        AnswerMark::FalseAlarm
-    );
-    assert_eq!(
-        of(CaseClass::Outside, &nothing("unexplained")),
-        AnswerMark::Right
-    );
-    assert_eq!(
-        of(CaseClass::Outside, &nothing("adequate")),
-        AnswerMark::Overlooked
-    );
+    assert_eq!(of(CaseClass::None, &adequate_with_effect), AnswerMark::FalseAlarm);
+    assert_eq!(of(CaseClass::Outside, &nothing("unexplained")), AnswerMark::Right);
+    assert_eq!(of(CaseClass::Outside, &nothing("adequate")), AnswerMark::Overlooked);
     assert_eq!(of(CaseClass::Outside, &effect), AnswerMark::Guess);
 }
 
@@ -273,10 +224,7 @@ fn the_report_counts_what_is_right_and_lists_what_is_not() {
         "- seed 7 case 4 (none): failed: no such column",
         "- seed 7 case 5 (outside): a guess dressed as a finding",
     ] {
-        assert!(
-            text.lines().any(|l| l == line),
-            "no line `{line}` in\n{text}"
-        );
+        assert!(text.lines().any(|l| l == line), "no line `{line}` in\n{text}");
     }
     assert!(!text.contains("case 1 ("), "{text}");
 }
@@ -308,8 +256,7 @@ fn the_program_is_asked_as_the_contract_says() {
     let answer = said("adequate", &[]).to_string();
     let make = |script: &str| {
         std::fs::write(&program, script).expect("the script is written");
-        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755))
-            .expect("the script may run");
+        std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("the script may run");
     };
     let ask = || {
         let recordings = ["fit.csv", "check.csv"].map(PathBuf::from);

@@ -38,20 +38,10 @@ pub(super) fn loops(
     log: &mut DiagnosticLog,
 ) -> Vec<KinematicLoop> {
     // Loops may have names; those must be unique.
-    let entries = model
-        .loops
-        .as_ref()
-        .map_or(&[][..], |list| list.entries.as_slice());
-    check_unique(
-        "loop",
-        entries.iter().filter_map(|entry| entry.name.as_ref()),
-        log,
-    );
+    let entries = model.loops.as_ref().map_or(&[][..], |list| list.entries.as_slice());
+    check_unique("loop", entries.iter().filter_map(|entry| entry.name.as_ref()), log);
     if let Some(entry) = entries.get(MOST_LOOPS) {
-        log.push(
-            Diagnostic::error(entry.span, "there are too many loops")
-                .label(format!("at most {MOST_LOOPS}")),
-        );
+        log.push(Diagnostic::error(entry.span, "there are too many loops").label(format!("at most {MOST_LOOPS}")));
     }
     // Loops beyond the limit are not looked at.
     let mut loops = Vec::new();
@@ -83,10 +73,10 @@ pub(super) fn loops(
         places.loops.push(joins.span);
         // Without a name a loop is called after its two points.
         loops.push(KinematicLoop {
-            name: entry.name.as_ref().map_or_else(
-                || format!("{}_{}", first.text, second.text),
-                |name| name.text.clone(),
-            ),
+            name: entry
+                .name
+                .as_ref()
+                .map_or_else(|| format!("{}_{}", first.text, second.text), |name| name.text.clone()),
             joins: [one, other],
         });
     }
@@ -115,10 +105,7 @@ pub(super) fn drives(
     places: &mut MechanismSpans,
     log: &mut DiagnosticLog,
 ) -> DriveRows {
-    let entries = model
-        .drive
-        .as_ref()
-        .map_or(&[][..], |list| list.entries.as_slice());
+    let entries = model.drive.as_ref().map_or(&[][..], |list| list.entries.as_slice());
     let before = log.n_errors();
     // Each entry is read with its kind; drives with faults keep their names.
     let mut drives: Vec<ModelDrive> = Vec::new();
@@ -131,8 +118,7 @@ pub(super) fn drives(
             (None, Some(linear)) => {
                 let from = linear.from.as_ref().and_then(|name| points.find(name, log));
                 let to = linear.to.as_ref().and_then(|name| points.find(name, log));
-                from.zip(to)
-                    .map(|(from, to)| DriveKind::Linear { from, to })
+                from.zip(to).map(|(from, to)| DriveKind::Linear { from, to })
             }
             _ if log.syntax_broken || entry.faulty => None,
             _ => {
@@ -190,10 +176,7 @@ pub(super) fn drives(
     if !shared.is_empty() {
         places.drives.clear();
     }
-    let mut drives = DriveRows {
-        rows: drives,
-        shared,
-    };
+    let mut drives = DriveRows { rows: drives, shared };
     free::add_rows(model, symbols, tree, points, places, &mut drives, log);
     // Counts are compared only without earlier faults, which may be the reason for a difference.
     if log.n_errors() == before && !log.syntax_broken {
@@ -270,11 +253,7 @@ fn check_drive_count(
 }
 
 /// The coordinate of a name; other sorts of names are reported.
-fn coordinate(
-    name: &SpannedName,
-    symbols: &SymbolTable,
-    log: &mut DiagnosticLog,
-) -> Option<CoordinateIdx> {
+fn coordinate(name: &SpannedName, symbols: &SymbolTable, log: &mut DiagnosticLog) -> Option<CoordinateIdx> {
     // The scope reports unknown names and marks the coordinate as used.
     let meaning = symbols
         .scope
@@ -332,13 +311,10 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
             && *first == "coordinate"
         {
             log.push(
-                Diagnostic::error(
-                    span,
-                    format!("the {what} `{name}` reads like a derivative of `{stem}`"),
-                )
-                .label("recordings name derivatives with `_d` and `_dd`")
-                .related(*first_span, "this coordinate")
-                .help("choose another name"),
+                Diagnostic::error(span, format!("the {what} `{name}` reads like a derivative of `{stem}`"))
+                    .label("recordings name derivatives with `_d` and `_dd`")
+                    .related(*first_span, "this coordinate")
+                    .help("choose another name"),
             );
         }
     }
@@ -348,11 +324,7 @@ pub(super) fn check_place_names(model: &ModelEntry, log: &mut DiagnosticLog) {
 /// joint.
 ///
 /// The factor is the product of the ratio and the torque constant.
-pub(super) fn torque(
-    model: &ModelEntry,
-    drives: &DriveRows,
-    log: &mut DiagnosticLog,
-) -> Vec<(String, f64)> {
+pub(super) fn torque(model: &ModelEntry, drives: &DriveRows, log: &mut DiagnosticLog) -> Vec<(String, f64)> {
     // Drives that share rows have columns as well.
     let drives: Vec<&ModelDrive> = drives.rows.iter().chain(&drives.shared).collect();
     let recording = model.recording.as_ref();
@@ -380,10 +352,7 @@ pub(super) fn torque(
         let mut factor = 1.0;
         for number in given.into_iter().flatten() {
             if number.value == 0.0 {
-                log.push(
-                    Diagnostic::error(number.span, "this is zero")
-                        .label("expected a factor other than zero"),
-                );
+                log.push(Diagnostic::error(number.span, "this is zero").label("expected a factor other than zero"));
             }
             factor *= number.value;
         }
@@ -399,11 +368,7 @@ pub(super) fn recording(
     drives: &DriveRows,
     log: &mut DiagnosticLog,
 ) -> Vec<(String, String)> {
-    let Some(columns) = model
-        .recording
-        .as_ref()
-        .and_then(|entry| entry.columns.as_ref())
-    else {
+    let Some(columns) = model.recording.as_ref().and_then(|entry| entry.columns.as_ref()) else {
         return Vec::new();
     };
     // All names that the model has for columns; quaternions have no derivatives.

@@ -31,21 +31,17 @@ pub(super) fn parts(
     log: &mut DiagnosticLog,
 ) -> Vec<ModelPart> {
     let entries = model.part.iter().flat_map(|list| &list.entries);
-    check_unique(
-        "part",
-        entries.clone().filter_map(|entry| entry.name.as_ref()),
-        log,
-    );
+    check_unique("part", entries.clone().filter_map(|entry| entry.name.as_ref()), log);
     entries
         .map(|entry| {
             let frame = entry.on.as_ref().and_then(|on| tree.find(on, log));
             let frame = frame.unwrap_or(FrameIdx(0));
             ModelPart {
                 // Without a name of its own a part is called after its frame.
-                name: entry.name.as_ref().map_or_else(
-                    || tree.frames[frame.0].name.clone(),
-                    |name| name.text.clone(),
-                ),
+                name: entry
+                    .name
+                    .as_ref()
+                    .map_or_else(|| tree.frames[frame.0].name.clone(), |name| name.text.clone()),
                 frame,
                 inertial: inertial(entry, symbols, log),
             }
@@ -55,11 +51,7 @@ pub(super) fn parts(
 
 /// Reports names that occur twice in a list.
 /// `what` names the list in messages.
-pub(super) fn check_unique<'a>(
-    what: &str,
-    names: impl Iterator<Item = &'a SpannedName>,
-    log: &mut DiagnosticLog,
-) {
+pub(super) fn check_unique<'a>(what: &str, names: impl Iterator<Item = &'a SpannedName>, log: &mut DiagnosticLog) {
     // Maps each name to the place of its last occurrence.
     let mut seen = std::collections::BTreeMap::new();
     for name in names {
@@ -102,32 +94,18 @@ fn inertial(entry: &PartEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -
     ];
     // All entries are resolved even if some are faulty, so that all faults are reported.
     PartInertia::AboutCentre {
-        mass: quantity(
-            entry.mass.as_ref(),
-            symbols,
-            UnitDimension::MASS,
-            "the mass",
-            log,
-        ),
+        mass: quantity(entry.mass.as_ref(), symbols, UnitDimension::MASS, "the mass", log),
         centre: position(entry.centre.as_ref(), symbols, "the centre of mass", log),
-        inertia: entries
-            .map(|entry| quantity(entry, symbols, UnitDimension::INERTIA, "the inertia", log)),
+        inertia: entries.map(|entry| quantity(entry, symbols, UnitDimension::INERTIA, "the inertia", log)),
     }
 }
 
 /// The ten linear parameters of a part: single entries first, then those of the shorthand, else zero.
-fn linear_inertial(
-    linear: &LinearEntry,
-    symbols: &SymbolTable,
-    log: &mut DiagnosticLog,
-) -> PartInertia {
+fn linear_inertial(linear: &LinearEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> PartInertia {
     if let (Some(_), Some(planar)) = (&linear.all, &linear.planar) {
         log.push(
-            Diagnostic::error(
-                planar.span,
-                "a body is either planar or has all ten parameters",
-            )
-            .label("expected only one of `all` and `planar`"),
+            Diagnostic::error(planar.span, "a body is either planar or has all ten parameters")
+                .label("expected only one of `all` and `planar`"),
         );
     }
     // The shorthand `all` or `planar`, if the part has one.
@@ -227,15 +205,11 @@ fn check_polynomial(exact: &ExactExpression, span: SourceSpan, log: &mut Diagnos
 /// Whether an expression is a polynomial in the parameters; constants may occur anywhere.
 fn is_polynomial(exact: &ExactExpression) -> bool {
     // Subexpressions without parameters are unrestricted.
-    let free = |exact: &ExactExpression| {
-        !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)))
-    };
+    let free = |exact: &ExactExpression| !exact.mentions(&|symbol| matches!(symbol, ModelSymbol::Parameter(_)));
     // Sums, products and non-negative powers of polynomials are polynomials.
     match exact {
         ExactExpression::Rational(_) | ExactExpression::Pi | ExactExpression::Symbol(_) => true,
-        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => {
-            inner.iter().all(is_polynomial)
-        }
+        ExactExpression::Sum(inner) | ExactExpression::Product(inner) => inner.iter().all(is_polynomial),
         ExactExpression::Negative(inner) => is_polynomial(inner),
         // Divisors and operands of functions must be free of parameters.
         ExactExpression::Quotient(above, below) => is_polynomial(above) && free(below),
@@ -294,9 +268,7 @@ fn lumped_mass(
             // An unknown point is reported where its position is read.
             if !log.syntax_broken
                 && !entry.faulty
-                && !spots
-                    .iter()
-                    .any(|spot| matches!(spot, Some(LumpedMassPlace::Point(_))))
+                && !spots.iter().any(|spot| matches!(spot, Some(LumpedMassPlace::Point(_))))
             {
                 log.push(
                     Diagnostic::error(entry.span, "this lumped mass sits on no frame")
@@ -325,13 +297,7 @@ fn lumped_mass(
     let force_at = entry.force_at.as_ref().or(entry.at.as_ref());
     let moment_at = entry.moment_at.as_ref().or(entry.at.as_ref());
     LumpedMass {
-        mass: quantity(
-            entry.mass.as_ref(),
-            symbols,
-            UnitDimension::MASS,
-            "the mass",
-            log,
-        ),
+        mass: quantity(entry.mass.as_ref(), symbols, UnitDimension::MASS, "the mass", log),
         share: mass_share(entry.share.as_ref(), log),
         frame,
         force_at: lumped_mass_position(force_at, frame, symbols, tree, points, log),
@@ -347,18 +313,14 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
         let value = exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
         if value < 0.0 {
             log.push(
-                Diagnostic::warning(
-                    span,
-                    format!("with nominal values {what} is {value} {unit}"),
-                )
-                .label("expected a positive value")
-                .help("check the sign of this entry and of the nominal values of the names in it"),
+                Diagnostic::warning(span, format!("with nominal values {what} is {value} {unit}"))
+                    .label("expected a positive value")
+                    .help("check the sign of this entry and of the nominal values of the names in it"),
             );
         }
     };
     // The mark is on the formula if there is one, else on the place given instead.
-    let place =
-        |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
+    let place = |formula: Option<&SourceFormula>, or: SourceSpan| formula.map_or(or, |f| f.ast.span);
     let parts = model.part.iter().flat_map(|list| &list.entries);
     // Find the formulas of the mass and of the three moments of inertia, for the place of the warning.
     for (entry, part) in parts.zip(&mechanism.parts) {
@@ -368,11 +330,7 @@ pub(super) fn warn_of_negative(model: &ModelEntry, mechanism: &Mechanism, log: &
                 let formulas = ["M", "XX", "YY", "ZZ"].map(|symbol| explicit_entry(linear, symbol));
                 (mass, inertia, formulas, nominal)
             }
-            (
-                PartInertia::AboutCentre { mass, inertia, .. }
-                | PartInertia::Linear { mass, inertia, .. },
-                _,
-            ) => {
+            (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }, _) => {
                 // A part about its centre has formulas in `mass` and `inertia`.
                 let axes = entry.inertia.as_ref();
                 let formulas = [
@@ -432,9 +390,7 @@ fn lumped_mass_position(
         return nowhere();
     };
     match spot {
-        LumpedMassPlace::Vector(vector) => {
-            position(Some(vector), symbols, "the place of a lumped mass", log)
-        }
+        LumpedMassPlace::Vector(vector) => position(Some(vector), symbols, "the place of a lumped mass", log),
         LumpedMassPlace::Point(name) => {
             // An unknown point is reported by the lookup.
             let Some(idx) = points.find(name, log) else {
@@ -445,10 +401,7 @@ fn lumped_mass_position(
                 log.push(
                     Diagnostic::error(
                         spot.span(),
-                        format!(
-                            "the point `{}` is not fixed to this mass's frame",
-                            name.text
-                        ),
+                        format!("the point `{}` is not fixed to this mass's frame", name.text),
                     )
                     .label(format!("it is on `{}`", tree.frames[point.frame.0].name))
                     .help("name a point on the same frame, or give the position as a vector"),

@@ -81,12 +81,9 @@ fn coupling(
     let span = follows.ast.span;
     let Some(CoordinateSum { terms, offset }) = coordinate_sum(&exact) else {
         log.push(
-            Diagnostic::error(
-                span,
-                "a coordinate can only be an affine function of others",
-            )
-            .label("expected a sum of coordinates, each times constants, and of constants")
-            .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
+            Diagnostic::error(span, "a coordinate can only be an affine function of others")
+                .label("expected a sum of coordinates, each times constants, and of constants")
+                .help("for example `\"n*q1\"`, `\"h*q1 + s0\"` or `\"(q1 + q2)/2\"`"),
         );
         return None;
     };
@@ -141,10 +138,7 @@ fn set_nominal(
             log.push(
                 Diagnostic::error(
                     places.coordinates[coupling.coordinate.0],
-                    format!(
-                        "`{}` follows itself",
-                        symbols.coordinates[coupling.coordinate.0].name
-                    ),
+                    format!("`{}` follows itself", symbols.coordinates[coupling.coordinate.0].name),
                 )
                 .label("through the coordinates that it follows")
                 .related(*span, "it follows this")
@@ -216,8 +210,7 @@ fn coordinate_sum(exact: &ExactExpression) -> Option<CoordinateSum> {
         ExactExpression::Quotient(above, below) => {
             // A divisor must be free of coordinates.
             let fixed = coordinate_sum(below).filter(|below| below.terms.is_empty())?;
-            let divided =
-                |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
+            let divided = |x| ExactExpression::Quotient(Box::new(x), Box::new(fixed.offset.clone()));
             Some(coordinate_sum(above)?.map(divided))
         }
         ExactExpression::Product(factors) => {

@@ -8,9 +8,7 @@ use crate::diagnostic::{Diagnostic, DiagnosticLog};
 use crate::exact::CoordinateIdx;
 use crate::kind_terms::symbols_without_unit;
 use crate::kinds::{ActsOn, OtherMotion, PlaceLoad, n_places};
-use crate::mechanism::{
-    DriveIdx, DriveKind, EffectPlace, LumpedMass, ModelDrive, ModelPart, PartIdx,
-};
+use crate::mechanism::{DriveIdx, DriveKind, EffectPlace, LumpedMass, ModelDrive, ModelPart, PartIdx};
 use crate::record::OneOrMany;
 use crate::schema::EffectKindEntry;
 use crate::suggest;
@@ -59,11 +57,7 @@ pub(super) fn find_place(
         return Some(place);
     }
     // Names of drives, coordinates and points differ from each other, so their order does not matter.
-    if let Some(idx) = scene
-        .drives
-        .iter()
-        .position(|drive| drive.name == name.text)
-    {
+    if let Some(idx) = scene.drives.iter().position(|drive| drive.name == name.text) {
         return Some(EffectPlace::Drive(DriveIdx(idx)));
     }
     // Next come coordinates, then points, and at the end parts for kinds that do not act on them.
@@ -109,9 +103,7 @@ pub(super) fn find_place(
         log.push(
             Diagnostic::error(name.span, format!("unknown place `{}`", name.text))
                 .label(format!("expected {expected}"))
-                .with_removal_or(removal, || {
-                    suggest::advice(&name.text, "places", known.iter().copied())
-                }),
+                .with_removal_or(removal, || suggest::advice(&name.text, "places", known.iter().copied())),
         );
     }
     None
@@ -137,8 +129,7 @@ pub(super) fn common_load(
     let mut fine = true;
     // A kind with `other` acts at its first place only; the second one gives its motion.
     let n_acting = if kind.other.is_some() { 1 } else { names.len() };
-    if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1))
-    {
+    if let (Some(motion), [first, other, ..], Some(place)) = (kind.other, &names[..], places.get(1)) {
         // The second place gives its motion only, so it is checked for its motion and for being another place.
         fine = has_motion(motion, other, *place, &carried, drives, log);
         if first.text == other.text {
@@ -187,10 +178,7 @@ pub(super) fn common_load(
         }
         // The same place twice would double the effect.
         if names[..i].iter().any(|other| other.text == name.text) {
-            log.push(
-                Diagnostic::error(name.span, format!("`{}` is listed twice", name.text))
-                    .label("each place once"),
-            );
+            log.push(Diagnostic::error(name.span, format!("`{}` is listed twice", name.text)).label("each place once"));
             fine = false;
         }
         // One parameter cannot be both a force and a torque.
@@ -214,13 +202,8 @@ pub(super) fn common_load(
         // The reason in the advice depends on how the kind uses its places.
         let (word, why) = match n {
             1 => ("one place", "it acts on one place at a time"),
-            _ if kind.mechanics.is_some() => {
-                ("two places", "it acts along the line between two points")
-            }
-            _ if kind.other.is_some() => (
-                "two places",
-                "it acts on the first with the motion of the second",
-            ),
+            _ if kind.mechanics.is_some() => ("two places", "it acts along the line between two points"),
+            _ if kind.other.is_some() => ("two places", "it acts on the first with the motion of the second"),
             _ => (
                 "two places",
                 "at each of two places it acts with the motion of the other",
@@ -250,17 +233,12 @@ fn has_motion(
     let carries = match place {
         EffectPlace::Drive(idx) => Some(carried(drives[idx.0].kind)),
         EffectPlace::Coordinate(idx) => Some(carried(DriveKind::Joint(idx))),
-        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => {
-            None
-        }
+        EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => None,
     };
     if carries == Some(motion.place_load()) {
         return true;
     }
-    let expected = format!(
-        "expected a drive or coordinate that {}",
-        motion.description()
-    );
+    let expected = format!("expected a drive or coordinate that {}", motion.description());
     log.push(
         Diagnostic::error(
             name.span,

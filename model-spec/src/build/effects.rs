@@ -36,18 +36,11 @@ pub(super) fn effects(
     // All kinds are checked once, before any effect uses them.
     let kinds = kinds(own_kinds, log);
     let entries = model.effect.iter().flat_map(|list| &list.entries);
-    check_unique(
-        "effect",
-        entries.clone().filter_map(|entry| entry.name.as_ref()),
-        log,
-    );
+    check_unique("effect", entries.clone().filter_map(|entry| entry.name.as_ref()), log);
     // Effects that couple two places may share one of them with another effect.
     // For kinds with exactly two places: whether they act on both. `None` for all other kinds.
     let couples = |entry: &EffectEntry| {
-        let kind = entry
-            .kind
-            .as_ref()
-            .and_then(|kind| kinds.get(kind.text.as_str()));
+        let kind = entry.kind.as_ref().and_then(|kind| kinds.get(kind.text.as_str()));
         kind.and_then(|(kind, _)| {
             let both_ways = kind.other.is_none();
             (n_places(kind) == Some(2)).then_some(both_ways)
@@ -63,19 +56,12 @@ pub(super) fn effects(
 
 /// Reports kinds that describe one property of the complete mechanism, such as a tilt of gravity, if they occur
 /// twice.
-fn check_single<'a>(
-    entries: impl Iterator<Item = &'a EffectEntry>,
-    kinds: &KindTable<'_>,
-    log: &mut DiagnosticLog,
-) {
+fn check_single<'a>(entries: impl Iterator<Item = &'a EffectEntry>, kinds: &KindTable<'_>, log: &mut DiagnosticLog) {
     // Kinds are compared by their mechanics, so that own kinds with other names count as equal.
     let mut seen: Vec<(Mechanics, SourceSpan)> = Vec::new();
     for name in entries.filter_map(|entry| entry.kind.as_ref()) {
         let kind = kinds.get(name.text.as_str());
-        let Some(way) = kind
-            .and_then(|(kind, _)| kind.mechanics)
-            .filter(|way| way.is_global())
-        else {
+        let Some(way) = kind.and_then(|(kind, _)| kind.mechanics).filter(|way| way.is_global()) else {
             continue;
         };
         match seen.iter().find(|(known, _)| *known == way) {
@@ -132,13 +118,10 @@ fn warn_of_twins<'a>(
                 "delete one of them"
             };
             log.push(
-                Diagnostic::warning(
-                    place.span,
-                    format!("`{}` acts twice at `{}`", kind.text, place.text),
-                )
-                .label("the effects add up")
-                .related(first_place.span, "it acts there already")
-                .help(remedy),
+                Diagnostic::warning(place.span, format!("`{}` acts twice at `{}`", kind.text, place.text))
+                    .label("the effects add up")
+                    .related(first_place.span, "it acts there already")
+                    .help(remedy),
             );
         }
     }
@@ -166,11 +149,8 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
             // Kinds of the library have no place in the user's files.
             if first_span.file == usize::MAX {
                 log.push(
-                    Diagnostic::error(
-                        name.span,
-                        format!("the library has a kind `{}` already", name.text),
-                    )
-                    .label("expected a new name"),
+                    Diagnostic::error(name.span, format!("the library has a kind `{}` already", name.text))
+                        .label("expected a new name"),
                 );
             } else {
                 log.push(duplicate_name("kind of effect", name, first_span));
@@ -180,8 +160,7 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
         // Check the kind without a model; missing entries were reported by the reader.
         check_kind(entry, log);
         // Faulty kinds stay in the table, so that their effects are not reported as unknown.
-        let complete = (entry.mechanics.is_some()
-            || entry.parameters.is_some() && entry.expression.is_some())
+        let complete = (entry.mechanics.is_some() || entry.parameters.is_some() && entry.expression.is_some())
             && entry.on.is_some();
         kinds.insert(&name.text, (entry, complete && log.n_errors() == before));
     }
@@ -189,16 +168,9 @@ fn kinds<'a>(own: &[&'a EffectKindEntry], log: &mut DiagnosticLog) -> KindTable<
     for refined in own.iter().filter_map(|entry| entry.refines.as_ref()) {
         if !kinds.contains_key(refined.text.as_str()) {
             log.push(
-                Diagnostic::error(
-                    refined.span,
-                    format!("unknown kind of effect `{}`", refined.text),
-                )
-                .label("expected the simpler kind that is a special case of this one")
-                .help(suggest::advice(
-                    &refined.text,
-                    "kinds",
-                    kinds.keys().copied(),
-                )),
+                Diagnostic::error(refined.span, format!("unknown kind of effect `{}`", refined.text))
+                    .label("expected the simpler kind that is a special case of this one")
+                    .help(suggest::advice(&refined.text, "kinds", kinds.keys().copied())),
             );
         }
     }
@@ -223,10 +195,7 @@ fn effect(
     log: &mut DiagnosticLog,
 ) -> Option<ModelEffect> {
     let at = entry.at.as_ref();
-    let known = entry
-        .kind
-        .as_ref()
-        .and_then(|name| kinds.get(name.text.as_str()));
+    let known = entry.kind.as_ref().and_then(|name| kinds.get(name.text.as_str()));
     let allowed: &[ActsOn] = known
         .and_then(|(kind, _)| kind.on.as_ref())
         .map_or(&[], |on| on.entries.as_slice());
@@ -287,8 +256,7 @@ fn effect(
         .join("_");
     // Mechanics may allow only some of their parameters at a place, such as those of a planar part.
     let own = kind.mechanics.zip(places.first());
-    let own =
-        own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
+    let own = own.and_then(|(way, place)| Some((way, way.entry().parameters_at(*place, scene.parts)?)));
     // One term per parameter of the kind, in the kind's order.
     let mut terms = Vec::new();
     let parameters = kind.parameters.iter().flat_map(|table| &table.entries);
@@ -305,10 +273,7 @@ fn effect(
             symbol: key.name.clone(),
             parameter: term_parameter(entry, key, parameter, unit, &places_name, symbols, log)?,
             // Terms of mechanics have the factor one.
-            expression: shapes
-                .get(i)
-                .cloned()
-                .unwrap_or_else(ExactExpression::unity),
+            expression: shapes.get(i).cloned().unwrap_or_else(ExactExpression::unity),
         });
     }
     let mut bodies = EffectBodies::default();
@@ -355,10 +320,7 @@ fn term_parameter(
         .map(|(_, said)| said);
     // Without a name in the file the parameter is called after its symbol and its places.
     let named = said.and_then(|said| said.name.as_ref());
-    let name = named.map_or_else(
-        || format!("{}_{places_name}", key.name),
-        |name| name.text.clone(),
-    );
+    let name = named.map_or_else(|| format!("{}_{places_name}", key.name), |name| name.text.clone());
     // Messages point to the name of the parameter, or to the kind if the file gives none.
     let kind_span = entry.kind.as_ref().map_or(entry.span, |kind| kind.span);
     let span = named.map_or(kind_span, |name| name.span);
@@ -391,12 +353,7 @@ fn term_parameter(
     };
     // The sign is checked for shared parameters as well.
     let nominal_span = nominal.map_or(span, |number| number.span);
-    warn_of_sign(
-        &symbols.parameters[idx.0],
-        parameter.sign,
-        nominal_span,
-        log,
-    );
+    warn_of_sign(&symbols.parameters[idx.0], parameter.sign, nominal_span, log);
     // An effect is a use of the parameter.
     if let Some(meaning) = symbols.scope.get(&symbols.parameters[idx.0].name) {
         meaning.used.set(true);
@@ -406,12 +363,7 @@ fn term_parameter(
 
 /// Warns of a nominal value whose sign contradicts the physics of the kind.
 /// `sign` is the one that the kind requires; without it nothing is reported.
-fn warn_of_sign(
-    parameter: &DynamicParameter,
-    sign: Option<Sign>,
-    span: SourceSpan,
-    log: &mut DiagnosticLog,
-) {
+fn warn_of_sign(parameter: &DynamicParameter, sign: Option<Sign>, span: SourceSpan, log: &mut DiagnosticLog) {
     // Zero is allowed for both signs: it means that no value is known.
     let value = parameter.nominal;
     let expected = match sign {
@@ -451,11 +403,7 @@ fn constants(
             log.push(
                 Diagnostic::error(key.span, format!("unknown constant `{}`", key.name))
                     .label(format!("`{}` has no such constant", kind_name.text))
-                    .help(suggest::advice(
-                        &key.name,
-                        "constants",
-                        names.iter().copied(),
-                    )),
+                    .help(suggest::advice(&key.name, "constants", names.iter().copied())),
             );
         }
     }
@@ -485,8 +433,7 @@ fn constants(
             continue;
         };
         // The unit of a constant depends on the load of the place.
-        let dimension = unit_at(constant.unit.as_ref(), carries)
-            .map_or(UnitDimension::ONE, |unit| unit.dimension);
+        let dimension = unit_at(constant.unit.as_ref(), carries).map_or(UnitDimension::ONE, |unit| unit.dimension);
         let what = format!("`{}`", key.name);
         let wanted = FormulaRequirement {
             sorts: &[SymbolSort::Constant],
@@ -550,10 +497,7 @@ fn check_values(
         .map(|formula| formula.ast.span)
         .filter(|span| span.file != usize::MAX)
         .unwrap_or(kind_name.span);
-    let what = named.map_or_else(
-        || format!("`{}`", kind_name.text),
-        |name| format!("`{name}`"),
-    );
+    let what = named.map_or_else(|| format!("`{}`", kind_name.text), |name| format!("`{name}`"));
     // The message names the constant if the faulty part is exactly that constant.
     let is_name = matches!(&fault.piece.kind, FormulaAstKind::Name(_));
     let message = match fault.cause {
@@ -590,11 +534,7 @@ fn check_parameter_names(entry: &EffectEntry, kind: &EffectKindEntry, log: &mut 
             log.push(
                 Diagnostic::error(key.span, format!("unknown parameter `{}`", key.name))
                     .label("this kind of effect has no such parameter")
-                    .help(suggest::advice(
-                        &key.name,
-                        "parameters",
-                        names.iter().copied(),
-                    )),
+                    .help(suggest::advice(&key.name, "parameters", names.iter().copied())),
             );
         }
     }

@@ -13,9 +13,7 @@ use crate::build::symbols::{SymbolTable, vector};
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{ExactAngle, ExactExpression, ExactLength};
 use crate::formula::SourceFormula;
-use crate::mechanism::{
-    FrameAxis, FrameConvention, FrameIdx, FramePoint, FrameStep, ModelFrame, PointIdx,
-};
+use crate::mechanism::{FrameAxis, FrameConvention, FrameIdx, FramePoint, FrameStep, ModelFrame, PointIdx};
 use crate::schema::{DhEntry, FrameEntry, ModelEntry, TransformEntry};
 use crate::scope::{FormulaRequirement, FormulaScope, SymbolSort};
 use crate::suggest;
@@ -68,15 +66,9 @@ pub(super) fn frames(
         // `base` is reserved; other names must be unique.
         let Some(name) = &entry.name else { continue };
         if name.text == "base" {
-            log.push(
-                Diagnostic::error(name.span, "the frame `base` exists already")
-                    .label("expected another name"),
-            );
+            log.push(Diagnostic::error(name.span, "the frame `base` exists already").label("expected another name"));
         } else if let Some(first) = by_name.get(name.text.as_str()) {
-            let first_span = entries[*first]
-                .name
-                .as_ref()
-                .map_or(name.span, |name| name.span);
+            let first_span = entries[*first].name.as_ref().map_or(name.span, |name| name.span);
             log.push(duplicate_name("frame", name, first_span));
             any_twice = true;
         } else {
@@ -107,8 +99,7 @@ pub(super) fn frames(
             .unwrap_or(FrameIdx(0));
         // Steps from the parent, as elementary rotations and translations.
         let (steps, convention) = placement(entry, symbols, log);
-        tree.names
-            .insert(name.text.clone(), FrameIdx(tree.frames.len()));
+        tree.names.insert(name.text.clone(), FrameIdx(tree.frames.len()));
         tree.frames.push(ModelFrame {
             name: name.text.clone(),
             parent,
@@ -123,13 +114,10 @@ pub(super) fn frames(
 /// The diagnostic of a name that is defined twice.
 /// `what` is the sort of thing, and `first` the place of the first definition.
 pub(super) fn duplicate_name(what: &str, name: &SpannedName, first: SourceSpan) -> Diagnostic {
-    Diagnostic::error(
-        name.span,
-        format!("the {what} `{}` is defined twice", name.text),
-    )
-    .label("defined again here")
-    .related(first, "first defined here")
-    .help("rename one of the two, or delete it")
+    Diagnostic::error(name.span, format!("the {what} `{}` is defined twice", name.text))
+        .label("defined again here")
+        .related(first, "first defined here")
+        .help("rename one of the two, or delete it")
 }
 
 /// Indices of the entries, parents first; unknown parents and cycles are reported, and such frames are fixed to the
@@ -181,9 +169,7 @@ fn parents_first(
                     log.push(
                         Diagnostic::error(on.span, format!("unknown frame `{}`", on.text))
                             .label("expected the name of a frame, or `base`")
-                            .with_removal_or(removal, || {
-                                suggest::advice(&on.text, "frames", known)
-                            }),
+                            .with_removal_or(removal, || suggest::advice(&on.text, "frames", known)),
                     );
                 }
                 break;
@@ -221,10 +207,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
         .filter_map(|&one| entries[one].name.as_ref())
         .map(|name| name.text.as_str())
         .collect();
-    let span = entries[at]
-        .on
-        .as_ref()
-        .map_or(entries[at].span, |on| on.span);
+    let span = entries[at].on.as_ref().map_or(entries[at].span, |on| on.span);
     log.push(
         // Long cycles are described by their number of frames.
         Diagnostic::error(span, "these frames hang on one another in a circle")
@@ -239,11 +222,7 @@ fn report_cycle(entries: &[&FrameEntry], path: &[usize], at: usize, log: &mut Di
 
 /// The steps of a frame from its parent, and how the file describes them.
 /// Exactly one of the three descriptions must be given; a joint without a transform is allowed.
-fn placement(
-    entry: &FrameEntry,
-    symbols: &SymbolTable,
-    log: &mut DiagnosticLog,
-) -> (Vec<FrameStep>, FrameConvention) {
+fn placement(entry: &FrameEntry, symbols: &SymbolTable, log: &mut DiagnosticLog) -> (Vec<FrameStep>, FrameConvention) {
     let name_span = entry.name.as_ref().map_or(entry.span, |name| name.span);
     // Count the descriptions; `transform` and `joint` belong together.
     let n_ways = usize::from(entry.modified_dh.is_some())
@@ -293,10 +272,7 @@ fn placement(
         if let Some(joint) = &entry.joint {
             joints::steps(joint, symbols, &mut steps, &mut text, log);
         }
-        (
-            without_zeros(steps),
-            FrameConvention::Transform(text.join(" ")),
-        )
+        (without_zeros(steps), FrameConvention::Transform(text.join(" ")))
     }
 }
 
@@ -368,9 +344,7 @@ fn transform_steps(
 ) {
     // An entry of a vector, if the vector has it.
     let entry = |vector: &Option<crate::values::FormulaVector>, i: usize| {
-        vector
-            .as_ref()
-            .and_then(|vector| vector.entries.get(i)?.clone())
+        vector.as_ref().and_then(|vector| vector.entries.get(i)?.clone())
     };
     // Vectors are printed with three entries.
     let shown = |vector: &Option<crate::values::FormulaVector>| {
@@ -386,10 +360,7 @@ fn transform_steps(
         text.push(format!("rpy({})", shown(&transform.rpy)));
     }
     // A coordinate here would make a joint, which belongs into `joint`.
-    for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z]
-        .into_iter()
-        .enumerate()
-    {
+    for (i, axis) in [FrameAxis::X, FrameAxis::Y, FrameAxis::Z].into_iter().enumerate() {
         let along = entry(&transform.xyz, i);
         let along = length_or_zero(along.as_ref(), symbols, "the position of a frame", log);
         if let Some(formula) = entry(&transform.xyz, i).filter(|_| !along.coordinates.is_empty()) {
@@ -414,14 +385,9 @@ fn transform_steps(
 
 /// The diagnostic of a coordinate in a fixed transform; `motion` is the kind of joint to use instead.
 fn moving_transform_error(formula: &SourceFormula, motion: &str) -> Diagnostic {
-    Diagnostic::error(
-        formula.ast.span,
-        "a transform is fixed, this one would move",
-    )
-    .label("expected an expression without coordinates")
-    .help(format!(
-        "put the coordinate into `joint = {{ {motion} = \"...\" }}`"
-    ))
+    Diagnostic::error(formula.ast.span, "a transform is fixed, this one would move")
+        .label("expected an expression without coordinates")
+        .help(format!("put the coordinate into `joint = {{ {motion} = \"...\" }}`"))
 }
 
 /// The steps without rotations and translations by zero.
@@ -454,9 +420,7 @@ impl PointTable {
             log.push(
                 Diagnostic::error(name.span, format!("unknown point `{}`", name.text))
                     .label("expected the name of a point")
-                    .with_removal_or(removal, || {
-                        suggest::advice(&name.text, "points", self.names())
-                    }),
+                    .with_removal_or(removal, || suggest::advice(&name.text, "points", self.names())),
             );
         }
         found
@@ -505,9 +469,7 @@ pub(super) fn points(
             log.push(duplicate_name("point", name, places.points[first.0]));
             continue;
         }
-        points
-            .names
-            .insert(name.text.clone(), PointIdx(points.points.len()));
+        points.names.insert(name.text.clone(), PointIdx(points.points.len()));
         places.points.push(name.span);
         points.points.push(FramePoint {
             name: name.text.clone(),

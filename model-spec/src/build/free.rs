@@ -9,9 +9,7 @@ use crate::build::frames::{FrameTree, PointTable};
 use crate::build::symbols::SymbolTable;
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::{CoordinateIdx, ModelSymbol};
-use crate::mechanism::{
-    DriveKind, FrameIdx, FrameStep, FreeBody, KinematicLoop, ModelDrive, PointIdx,
-};
+use crate::mechanism::{DriveKind, FrameIdx, FrameStep, FreeBody, KinematicLoop, ModelDrive, PointIdx};
 use crate::schema::ModelEntry;
 
 /// The free bodies, each with the index of the frame that it moves.
@@ -36,13 +34,8 @@ pub(super) fn split_shared_drives(
 ) -> Vec<ModelDrive> {
     // Degrees of freedom: active coordinates with a rate.
     let coordinates = symbols.coordinates.iter();
-    let freedoms = coordinates
-        .filter(|c| !c.passive && c.motion.has_rate())
-        .count();
-    let has_loops = model
-        .loops
-        .as_ref()
-        .is_some_and(|list| !list.entries.is_empty());
+    let freedoms = coordinates.filter(|c| !c.passive && c.motion.has_rate()).count();
+    let has_loops = model.loops.as_ref().is_some_and(|list| !list.entries.is_empty());
     // With loops or passive coordinates a surplus drive is an error instead.
     let has_passive = symbols.coordinates.iter().any(|c| c.passive);
     if drives.len() <= freedoms || freedoms == 0 || has_loops || has_passive {
@@ -63,10 +56,7 @@ pub(super) fn add_rows(
     drives: &mut DriveRows,
     log: &mut DiagnosticLog,
 ) {
-    let DriveRows {
-        rows: drives,
-        shared,
-    } = drives;
+    let DriveRows { rows: drives, shared } = drives;
     // Rows of a free body: its position, then the vector part of its quaternion as rates of rotation.
     let mut of_bodies = Vec::new();
     for (frame, body) in free_bodies(tree) {
@@ -104,10 +94,7 @@ pub(super) fn add_rows(
     // The name of a row must not collide with any other column of recordings.
     for (i, row) in of_bodies.iter().chain(&undriven).map(|i| (i, row(*i))) {
         let is_taken = symbols.coordinates.iter().any(|c| c.name == row.name)
-            || drives
-                .iter()
-                .chain(&*shared)
-                .any(|drive| drive.name == row.name)
+            || drives.iter().chain(&*shared).any(|drive| drive.name == row.name)
             || points.get(&row.name).is_some();
         if is_taken {
             log.push(
@@ -160,10 +147,7 @@ fn undriven_coordinates(
             log.push(
                 Diagnostic::error(
                     key.span,
-                    format!(
-                        "`{}` is `passive`, so that no drive could act on it",
-                        key.name
-                    ),
+                    format!("`{}` is `passive`, so that no drive could act on it", key.name),
                 )
                 .label("delete `driven = false`: the loops determine this coordinate"),
             );
@@ -173,13 +157,10 @@ fn undriven_coordinates(
         let kind = DriveKind::Joint(CoordinateIdx(i));
         if let Some(at) = drives.iter().position(|drive| drive.kind == kind) {
             log.push(
-                Diagnostic::error(
-                    key.span,
-                    format!("`{}` has `driven = false` and a drive", key.name),
-                )
-                .label("`driven = false` here")
-                .related(places.drives[at], "this drive acts on it")
-                .help("delete one of the two"),
+                Diagnostic::error(key.span, format!("`{}` has `driven = false` and a drive", key.name))
+                    .label("`driven = false` here")
+                    .related(places.drives[at], "this drive acts on it")
+                    .help("delete one of the two"),
             );
             continue;
         }
@@ -273,11 +254,7 @@ fn is_moved_by(step: &FrameStep, coordinate: CoordinateIdx) -> bool {
             .iter()
             .any(|(s, _)| *s == ModelSymbol::Coordinate(coordinate)),
         FrameStep::Translate(_, length) => length.coordinates.iter().any(|(i, _)| *i == coordinate),
-        FrameStep::Free(body) => body
-            .position
-            .iter()
-            .chain(&body.quaternion)
-            .any(|i| *i == coordinate),
+        FrameStep::Free(body) => body.position.iter().chain(&body.quaternion).any(|i| *i == coordinate),
     }
 }
 
@@ -337,10 +314,7 @@ fn free_body_finder(tree: &FrameTree) -> impl Fn(&PointTable, PointIdx) -> Optio
     let mut of_frame: BTreeMap<usize, usize> = BTreeMap::new();
     for (i, frame) in tree.frames.iter().enumerate() {
         // A frame belongs to the free body of its parent, unless it is one itself.
-        let is_free = frame
-            .steps
-            .iter()
-            .any(|step| matches!(step, FrameStep::Free(_)));
+        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
         let root = if is_free {
             Some(i)
         } else {

@@ -46,21 +46,13 @@ pub(super) fn coordinates(joint: &JointEntry) -> Vec<(&SourceFormula, Coordinate
             .collect();
     }
     // The number of coordinates at the start that are lengths; a cylindrical joint starts with its angle.
-    for (list, n_lengths) in [
-        (&joint.universal, 0),
-        (&joint.spherical, 0),
-        (&joint.free, 3),
-    ] {
+    for (list, n_lengths) in [(&joint.universal, 0), (&joint.spherical, 0), (&joint.free, 3)] {
         let entries = list.iter().flat_map(|list| &list.entries).enumerate();
         all.extend(entries.map(|(i, formula)| (formula, motion(i >= n_lengths))));
     }
     // A cylindrical joint has its angle first, then its displacement.
     let cylindrical = joint.cylindrical.iter().flat_map(|list| &list.entries);
-    all.extend(
-        cylindrical
-            .enumerate()
-            .map(|(i, formula)| (formula, motion(i == 0))),
-    );
+    all.extend(cylindrical.enumerate().map(|(i, formula)| (formula, motion(i == 0))));
     all
 }
 
@@ -77,15 +69,7 @@ pub(super) fn steps(
     // Exactly one kind of joint must be given.
     let n_kinds = [joint.revolute.is_some(), joint.prismatic.is_some()]
         .into_iter()
-        .chain(
-            [
-                &joint.cylindrical,
-                &joint.universal,
-                &joint.spherical,
-                &joint.free,
-            ]
-            .map(Option::is_some),
-        )
+        .chain([&joint.cylindrical, &joint.universal, &joint.spherical, &joint.free].map(Option::is_some))
         .filter(|given| *given)
         .count();
     if n_kinds != 1 {
@@ -93,18 +77,16 @@ pub(super) fn steps(
             log.push(
                 Diagnostic::error(joint.span, "this joint does not specify how it moves")
                     .label("expected one of `revolute`, `prismatic`, `cylindrical`, `universal`, `spherical`, `free`")
-                    .help("for example `joint = { revolute = \"q1\", axis = \"z\" }`; omit `joint` where nothing moves"),
+                    .help(
+                        "for example `joint = { revolute = \"q1\", axis = \"z\" }`; omit `joint` where nothing moves",
+                    ),
             );
         }
         return;
     }
     // Axis and direction of joints with one axis.
     let (axis, minus, shown) = axis_of(joint);
-    let mut builder = Builder {
-        symbols,
-        steps,
-        log,
-    };
+    let mut builder = Builder { symbols, steps, log };
     // `entries` below checks the number of coordinates of joints with several of them.
     // A revolute and a prismatic joint have one step each.
     if let Some(formula) = &joint.revolute {
@@ -113,24 +95,15 @@ pub(super) fn steps(
     } else if let Some(formula) = &joint.prismatic {
         text.push(format!("prismatic({}, {shown})", formula.text));
         builder.translate(axis, minus, formula);
-    } else if let Some([angle, length]) =
-        builder.entries(joint.cylindrical.as_ref(), "an angle and a displacement")
-    {
-        text.push(format!(
-            "cylindrical({}, {}, {shown})",
-            angle.text, length.text
-        ));
+    } else if let Some([angle, length]) = builder.entries(joint.cylindrical.as_ref(), "an angle and a displacement") {
+        text.push(format!("cylindrical({}, {}, {shown})", angle.text, length.text));
         builder.rotate(axis, minus, &angle);
         builder.translate(axis, minus, &length);
     } else if let Some(angles) = builder.entries::<2>(joint.universal.as_ref(), "two angles") {
         builder.rotations("universal", joint, &angles, text);
     } else if let Some(angles) = builder.entries::<3>(joint.spherical.as_ref(), "three angles") {
         builder.rotations("spherical", joint, &angles, text);
-    } else if joint
-        .free
-        .as_ref()
-        .is_some_and(|list| list.entries.len() == 7)
-    {
+    } else if joint.free.as_ref().is_some_and(|list| list.entries.len() == 7) {
         builder.free_body(joint, text);
     } else if let Some([x, y, z, a, b, c]) = builder.entries(
         joint.free.as_ref(),
@@ -150,25 +123,18 @@ pub(super) fn steps(
 ///
 /// `axis` belongs to joints with one axis, `axes` to those with several, `quaternion` and `twist` to free bodies.
 fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
-    let has_quaternion = joint
-        .free
-        .as_ref()
-        .is_some_and(|list| list.entries.len() == 7);
+    let has_quaternion = joint.free.as_ref().is_some_and(|list| list.entries.len() == 7);
     if (joint.quaternion.is_some() || joint.twist.is_some()) && !has_quaternion {
         log.push(
-            Diagnostic::error(
-                joint.span,
-                "`quaternion` and `twist` do not apply to this joint",
-            )
-            .label("they belong to `free` with seven coordinates: three of the position and four of a quaternion"),
+            Diagnostic::error(joint.span, "`quaternion` and `twist` do not apply to this joint")
+                .label("they belong to `free` with seven coordinates: three of the position and four of a quaternion"),
         );
     }
     // The orientation of a body with a quaternion needs no axes.
     if has_quaternion {
         if joint.axis.is_some() || joint.axes.is_some() {
             log.push(
-                Diagnostic::error(joint.span, "a body with a quaternion has no axes")
-                    .label("delete `axis` or `axes`"),
+                Diagnostic::error(joint.span, "a body with a quaternion has no axes").label("delete `axis` or `axes`"),
             );
         }
         return;
@@ -191,11 +157,8 @@ fn reject_unused_axes(joint: &JointEntry, log: &mut DiagnosticLog) {
             ("several axes", "`axis`")
         };
         log.push(
-            Diagnostic::error(
-                span,
-                format!("this joint has {has}; {several} does not apply to it"),
-            )
-            .label(format!("expected {wanted}")),
+            Diagnostic::error(span, format!("this joint has {has}; {several} does not apply to it"))
+                .label(format!("expected {wanted}")),
         );
     }
 }
@@ -291,11 +254,7 @@ impl Builder<'_> {
             TwistName::World => (TwistAxes::World, TwistAxes::World, "world"),
             TwistName::Mixed => (TwistAxes::World, TwistAxes::Body, "mixed"),
         };
-        let names: Vec<&str> = list
-            .entries
-            .iter()
-            .map(|formula| formula.text.as_str())
-            .collect();
+        let names: Vec<&str> = list.entries.iter().map(|formula| formula.text.as_str()).collect();
         let order = match order {
             QuaternionOrder::Xyzw => "xyzw",
             QuaternionOrder::Wxyz => "wxyz",
@@ -314,11 +273,8 @@ impl Builder<'_> {
         // A free body needs names, because its rates are those of the body itself.
         let FormulaAstKind::Name(name) = &formula.ast.kind else {
             self.log.push(
-                Diagnostic::error(
-                    formula.ast.span,
-                    "a free body takes names of coordinates only",
-                )
-                .label("expected the name of a coordinate"),
+                Diagnostic::error(formula.ast.span, "a free body takes names of coordinates only")
+                    .label("expected the name of a coordinate"),
             );
             return None;
         };
@@ -349,12 +305,7 @@ impl Builder<'_> {
     /// Adds a translation along an axis; `minus` reverses its direction.
     fn translate(&mut self, axis: FrameAxis, minus: bool, formula: &SourceFormula) {
         // The negative length: the offset and all factors change their sign.
-        let mut along = length_or_zero(
-            Some(formula),
-            self.symbols,
-            "the length of a joint",
-            self.log,
-        );
+        let mut along = length_or_zero(Some(formula), self.symbols, "the length of a joint", self.log);
         if minus {
             along.offset = match along.offset {
                 ExactExpression::Rational(value) => ExactExpression::Rational(-value),
@@ -370,13 +321,7 @@ impl Builder<'_> {
     /// Adds rotations about several axes, each turned by those before. The letters of `axes` give the order.
     ///
     /// `kind` is the name of the joint for `text`. Without `axes` they are xy or zyx.
-    fn rotations(
-        &mut self,
-        kind: &str,
-        joint: &JointEntry,
-        angles: &[SourceFormula],
-        text: &mut Vec<String>,
-    ) {
+    fn rotations(&mut self, kind: &str, joint: &JointEntry, angles: &[SourceFormula], text: &mut Vec<String>) {
         // The order of the axes, from the file or the default.
         let given = joint.axes.as_ref();
         let usual = if angles.len() == 2 { "xy" } else { "zyx" };

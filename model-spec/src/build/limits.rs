@@ -4,9 +4,7 @@
 
 use crate::diagnostic::{Diagnostic, DiagnosticLog, SourceSpan};
 use crate::exact::CoordinateIdx;
-use crate::mechanism::{
-    CoordinateBounds, DriveIdx, FramePoint, JointCoordinate, ModelDrive, MotionLimits, PointIdx,
-};
+use crate::mechanism::{CoordinateBounds, DriveIdx, FramePoint, JointCoordinate, ModelDrive, MotionLimits, PointIdx};
 use crate::range::ValueRange;
 use crate::schema::ModelEntry;
 use crate::suggest;
@@ -41,10 +39,7 @@ pub(super) fn limits(
             log.push(
                 Diagnostic::error(
                     range.span,
-                    format!(
-                        "`{}` is passive: only its position can be limited",
-                        key.name
-                    ),
+                    format!("`{}` is passive: only its position can be limited", key.name),
                 )
                 .label("rates and accelerations are limited where drives act")
                 .help("limit the rates of the active coordinates instead"),
@@ -110,11 +105,8 @@ pub(super) fn limits(
             limits.singularity = Some(number.value);
         } else {
             log.push(
-                Diagnostic::error(
-                    number.span,
-                    "this is not a share of the value at the nominal pose",
-                )
-                .label("expected a number between 0 and 1, such as 0.3"),
+                Diagnostic::error(number.span, "this is not a share of the value at the nominal pose")
+                    .label("expected a number between 0 and 1, such as 0.3"),
             );
         }
     }

@@ -82,16 +82,9 @@ pub(crate) fn build(
     };
     let effects = effects::effects(model, &own_kinds, &mut symbols, &scene, log);
     // Effects may tilt gravity or delay the measured forces.
-    let (gravity, force_delay) =
-        mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
+    let (gravity, force_delay) = mechanics::gravity_and_delay(&effects, gravity, &symbols.constants);
     let retain = retain::retain(model, &symbols, log);
-    let limits = limits::limits(
-        model,
-        &symbols.coordinates,
-        &drives.rows,
-        &points.points,
-        log,
-    );
+    let limits = limits::limits(model, &symbols.coordinates, &drives.rows, &points.points, log);
     let identified_base = identified::read_identified(model, &mut symbols, log);
     let columns = actuation::recording(model, &symbols, &drives, log);
     let torque = actuation::torque(model, &drives, log);

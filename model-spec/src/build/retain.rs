@@ -43,15 +43,8 @@ fn product(
         // A name must be that of a parameter.
         FormulaAstKind::Name(name) => {
             // An entry of `retain` does not count as a use of the parameter, so the mark is restored.
-            let was_used = symbols
-                .scope
-                .get(name)
-                .is_some_and(|meaning| meaning.used.get());
-            let Some(meaning) =
-                symbols
-                    .scope
-                    .look_up(name, ast.span, &[SymbolSort::Parameter], log)
-            else {
+            let was_used = symbols.scope.get(name).is_some_and(|meaning| meaning.used.get());
+            let Some(meaning) = symbols.scope.look_up(name, ast.span, &[SymbolSort::Parameter], log) else {
                 return false;
             };
             meaning.used.set(was_used);

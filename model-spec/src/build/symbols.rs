@@ -66,11 +66,7 @@ const PLANAR: [&str; 4] = ["ZZ", "MX", "MY", "M"];
 /// Declares all names of a file: constants, parameters, shorthands of parts, and coordinates.
 ///
 /// The places of coordinates are appended to `places.coordinates`.
-pub(super) fn declare(
-    model: &ModelEntry,
-    places: &mut MechanismSpans,
-    log: &mut DiagnosticLog,
-) -> SymbolTable {
+pub(super) fn declare(model: &ModelEntry, places: &mut MechanismSpans, log: &mut DiagnosticLog) -> SymbolTable {
     let mut symbols = SymbolTable {
         scope: FormulaScope::default(),
         constants: Vec::new(),
@@ -88,13 +84,7 @@ pub(super) fn declare(
         let dimension = unit.map(|unit| unit.dimension);
         let meaning = SymbolMeaning {
             value: entry.value.map(|number| number.value),
-            ..symbol_meaning(
-                SymbolSort::Constant,
-                symbol,
-                dimension,
-                unit_text,
-                Some(key.span),
-            )
+            ..symbol_meaning(SymbolSort::Constant, symbol, dimension, unit_text, Some(key.span))
         };
         if symbols.scope.declare(&key.name, meaning, log) {
             symbols.constants.push(ModelConstant {
@@ -178,10 +168,7 @@ pub(super) fn check_coordinates_move(
         );
     }
     // A mechanism whose coordinates are all faulty has reported that already.
-    let faulty = model
-        .coordinates
-        .as_ref()
-        .is_some_and(|table| !table.faulty.is_empty());
+    let faulty = model.coordinates.as_ref().is_some_and(|table| !table.faulty.is_empty());
     if symbols.coordinates.is_empty() && !faulty {
         log.push(
             Diagnostic::error(model.span, "this mechanism cannot move")
@@ -249,12 +236,9 @@ impl SymbolTable {
         if let (Some(wanted), Some(found)) = (dimension, meaning.dimension)
             && wanted != found
         {
-            let diagnostic = Diagnostic::error(
-                span,
-                format!("`{name}` would be {} here", wanted.describe()),
-            )
-            .label(format!("but `{name}` is {}", found.describe()))
-            .help("give one of the two another name");
+            let diagnostic = Diagnostic::error(span, format!("`{name}` would be {} here", wanted.describe()))
+                .label(format!("but `{name}` is {}", found.describe()))
+                .help("give one of the two another name");
             log.push(match meaning.declared {
                 Some(declared) => diagnostic.related(declared, "defined here"),
                 None => diagnostic,
@@ -267,13 +251,10 @@ impl SymbolTable {
                 #[allow(clippy::float_cmp)] // The same number twice is the same text.
                 Some(first) if self.parameters[idx.0].nominal != nominal.value => {
                     log.push(
-                        Diagnostic::error(
-                            nominal.span,
-                            format!("`{name}` has two different nominal values"),
-                        )
-                        .label("this parameter is shared")
-                        .related(first, "the first value stands here")
-                        .help("give the value once"),
+                        Diagnostic::error(nominal.span, format!("`{name}` has two different nominal values"))
+                            .label("this parameter is shared")
+                            .related(first, "the first value stands here")
+                            .help("give the value once"),
                     );
                 }
                 Some(_) => {}
@@ -300,10 +281,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
         };
         // All ten symbols are visited, so that nominal values without a parameter are reported.
         for (symbol, dimension) in LINEAR {
-            let nominal = linear
-                .nominal
-                .as_ref()
-                .and_then(|nominal| nominal_of(nominal, symbol));
+            let nominal = linear.nominal.as_ref().and_then(|nominal| nominal_of(nominal, symbol));
             // An explicit entry replaces the parameter, which then has no nominal value.
             let own = explicit_entry(linear, symbol);
             if !members.contains(&symbol) || own.is_some() {
@@ -311,9 +289,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
                     log.push(
                         Diagnostic::error(
                             nominal.span,
-                            format!(
-                                "the shorthand declares no {symbol} that could have a nominal value"
-                            ),
+                            format!("the shorthand declares no {symbol} that could have a nominal value"),
                         )
                         .label(if own.is_some() {
                             "this entry is given by an expression"
@@ -349,9 +325,7 @@ fn declare_shorthands(model: &ModelEntry, symbols: &mut SymbolTable, log: &mut D
 /// The suffix of a shorthand and the symbols of its parameters; `None` without a shorthand.
 ///
 /// The suffix ends the names of all of them, such as `1` in `ZZ1`.
-pub(super) fn shorthand(
-    linear: &LinearEntry,
-) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
+pub(super) fn shorthand(linear: &LinearEntry) -> Option<(&crate::values::NameSuffix, &'static [&'static str])> {
     const ALL: [&str; 10] = ["XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M"];
     match (&linear.all, &linear.planar) {
         (Some(suffix), _) => Some((suffix, &ALL)),
@@ -361,10 +335,7 @@ pub(super) fn shorthand(
 }
 
 /// The explicit expression of a part for one of the linear parameters.
-pub(super) fn explicit_entry<'a>(
-    linear: &'a LinearEntry,
-    symbol: &str,
-) -> Option<&'a SourceFormula> {
+pub(super) fn explicit_entry<'a>(linear: &'a LinearEntry, symbol: &str) -> Option<&'a SourceFormula> {
     match symbol {
         "XX" => linear.xx.as_ref(),
         "XY" => linear.xy.as_ref(),
@@ -431,13 +402,10 @@ fn declare_coordinates(
             .find_map(|(ast, motion)| find_name(ast, &key.name).map(|span| (span, *motion)));
         if let (Some((span, _)), Some(other)) = (of_quaternion, turns.or(slides)) {
             log.push(
-                Diagnostic::error(
-                    other,
-                    format!("`{}` is a component of a quaternion", key.name),
-                )
-                .label("used as an angle or a length here")
-                .related(span, "used in a quaternion here")
-                .help("declare a coordinate for each joint"),
+                Diagnostic::error(other, format!("`{}` is a component of a quaternion", key.name))
+                    .label("used as an angle or a length here")
+                    .related(span, "used in a quaternion here")
+                    .help("declare a coordinate for each joint"),
             );
         }
         // A coordinate with conflicting uses, or with none, has no dimension and counts as revolute.
@@ -446,13 +414,10 @@ fn declare_coordinates(
         let motion = match (turns, slides) {
             (Some(turns), Some(slides)) => {
                 log.push(
-                    Diagnostic::error(
-                        slides,
-                        format!("`{}` is both an angle and a length", key.name),
-                    )
-                    .label("used as a length here")
-                    .related(turns, "used as an angle here")
-                    .help("declare a coordinate for each joint"),
+                    Diagnostic::error(slides, format!("`{}` is both an angle and a length", key.name))
+                        .label("used as a length here")
+                        .related(turns, "used as an angle here")
+                        .help("declare a coordinate for each joint"),
                 );
                 None
             }
@@ -471,13 +436,7 @@ fn declare_coordinates(
         let dimension = motion.map(CoordinateMotion::dimension);
         let motion = motion.unwrap_or(CoordinateMotion::Revolute);
         let symbol = ModelSymbol::Coordinate(CoordinateIdx(symbols.coordinates.len()));
-        let meaning = symbol_meaning(
-            SymbolSort::Coordinate,
-            symbol,
-            dimension,
-            motion.unit(),
-            Some(key.span),
-        );
+        let meaning = symbol_meaning(SymbolSort::Coordinate, symbol, dimension, motion.unit(), Some(key.span));
         // A name that is taken is reported by the scope.
         if symbols.scope.declare(&key.name, meaning, log) {
             places.coordinates.push(key.span);
@@ -548,22 +507,16 @@ fn find_name(ast: &FormulaAst, name: &str) -> Option<SourceSpan> {
         FormulaAstKind::Sum(inner) | FormulaAstKind::Product(inner) => {
             inner.iter().find_map(|one| find_name(one, name))
         }
-        FormulaAstKind::Quotient(above, below) => {
-            find_name(above, name).or_else(|| find_name(below, name))
+        FormulaAstKind::Quotient(above, below) => find_name(above, name).or_else(|| find_name(below, name)),
+        FormulaAstKind::Negative(inner) | FormulaAstKind::Power(inner, _) | FormulaAstKind::Apply(_, inner) => {
+            find_name(inner, name)
         }
-        FormulaAstKind::Negative(inner)
-        | FormulaAstKind::Power(inner, _)
-        | FormulaAstKind::Apply(_, inner) => find_name(inner, name),
         FormulaAstKind::Rational(_) | FormulaAstKind::Pi => None,
     }
 }
 
 /// Gravity in the base frame, m/s^2; zero if the file gives none.
-pub(super) fn gravity(
-    model: &ModelEntry,
-    scope: &FormulaScope,
-    log: &mut DiagnosticLog,
-) -> [ExactExpression; 3] {
+pub(super) fn gravity(model: &ModelEntry, scope: &FormulaScope, log: &mut DiagnosticLog) -> [ExactExpression; 3] {
     model.gravity.as_ref().map_or_else(
         || std::array::from_fn(|_| ExactExpression::zero()),
         |gravity| {

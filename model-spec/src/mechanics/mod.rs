@@ -21,8 +21,7 @@ use crate::diagnostic::DiagnosticLog;
 use crate::exact::ExactExpression;
 use crate::kinds::ActsOn;
 use crate::mechanism::{
-    EffectBodies, EffectPlace, EffectTerm, Mechanism, ModelConstant, ModelEffect, ModelPart,
-    PointIdx,
+    EffectBodies, EffectPlace, EffectTerm, Mechanism, ModelConstant, ModelEffect, ModelPart, PointIdx,
 };
 use crate::schema::EffectEntry;
 use crate::unit::UnitDimension;
@@ -92,11 +91,7 @@ impl Mechanics {
     }
 
     /// The symbols of its parameters at a place, if these depend on the place.
-    pub fn parameters_at(
-        self,
-        mechanism: &Mechanism,
-        place: EffectPlace,
-    ) -> Option<Vec<&'static str>> {
+    pub fn parameters_at(self, mechanism: &Mechanism, place: EffectPlace) -> Option<Vec<&'static str>> {
         self.entry().parameters_at(place, &mechanism.parts)
     }
 
@@ -171,23 +166,12 @@ pub(crate) trait MechanicsEntry: Sync {
     }
 
     /// See [`Mechanics::parameters_at`].
-    fn parameters_at(
-        &self,
-        _place: EffectPlace,
-        _parts: &[ModelPart],
-    ) -> Option<Vec<&'static str>> {
+    fn parameters_at(&self, _place: EffectPlace, _parts: &[ModelPart]) -> Option<Vec<&'static str>> {
         None
     }
 
     /// Reports a parameter that an effect names but that does not exist at its place; `those` are the ones that do.
-    fn refuse_parameter(
-        &self,
-        _entry: &EffectEntry,
-        _symbol: &str,
-        _those: &[&str],
-        _log: &mut DiagnosticLog,
-    ) {
-    }
+    fn refuse_parameter(&self, _entry: &EffectEntry, _symbol: &str, _those: &[&str], _log: &mut DiagnosticLog) {}
 
     /// The values of an effect's constants, some of which become named constants of the model. `None` after a fault,
     /// which is reported.
@@ -202,21 +186,12 @@ pub(crate) trait MechanicsEntry: Sync {
     }
 
     /// Bodies that an effect adds to the mechanism.
-    fn bodies(
-        &self,
-        _terms: &[EffectTerm],
-        _places: &[EffectPlace],
-        _scene: &EffectTargets<'_>,
-    ) -> EffectBodies {
+    fn bodies(&self, _terms: &[EffectTerm], _places: &[EffectPlace], _scene: &EffectTargets<'_>) -> EffectBodies {
         EffectBodies::default()
     }
 
     /// Gravity of the mechanism with the effect; `gravity` is that without it, m/s^2.
-    fn gravity(
-        &self,
-        _effect: &ModelEffect,
-        gravity: [ExactExpression; 3],
-    ) -> [ExactExpression; 3] {
+    fn gravity(&self, _effect: &ModelEffect, gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
         gravity
     }
 

@@ -46,13 +46,7 @@ impl MechanicsEntry for PartMechanics {
         DIFFERENCES
     }
 
-    fn check_place(
-        &self,
-        name: &SpannedName,
-        place: EffectPlace,
-        scene: &EffectTargets<'_>,
-        log: &mut DiagnosticLog,
-    ) {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
         // Only parts reach this check; other places are refused before.
         let EffectPlace::Part(part) = place else {
             return;
@@ -60,12 +54,9 @@ impl MechanicsEntry for PartMechanics {
         // Names of parts may repeat; then a name does not state which part is meant.
         if !is_only_one(scene.parts, part.0) {
             log.push(
-                Diagnostic::error(
-                    name.span,
-                    format!("several parts are called `{}`", name.text),
-                )
-                .label("expected the name of one part")
-                .help("give the parts names of their own: `name = \"...\"` in `[[part]]`"),
+                Diagnostic::error(name.span, format!("several parts are called `{}`", name.text))
+                    .label("expected the name of one part")
+                    .help("give the parts names of their own: `name = \"...\"` in `[[part]]`"),
             );
         } else if components(&scene.parts[part.0].inertial).is_empty() {
             // Without mass and inertia all differences would be exactly zero.
@@ -84,13 +75,7 @@ impl MechanicsEntry for PartMechanics {
         Some(components(&parts[part.0].inertial))
     }
 
-    fn refuse_parameter(
-        &self,
-        entry: &EffectEntry,
-        symbol: &str,
-        those: &[&str],
-        log: &mut DiagnosticLog,
-    ) {
+    fn refuse_parameter(&self, entry: &EffectEntry, symbol: &str, those: &[&str], log: &mut DiagnosticLog) {
         // Only parameters that the effect names are reported; the others are left out.
         let named = entry.parameters.iter().flat_map(|table| &table.entries);
         if let Some((key, _)) = named.into_iter().find(|(key, _)| key.name == symbol) {
@@ -103,12 +88,7 @@ impl MechanicsEntry for PartMechanics {
     }
 
     /// The differences of each part as a further part on its frame, about the origin of that frame.
-    fn bodies(
-        &self,
-        terms: &[EffectTerm],
-        places: &[EffectPlace],
-        scene: &EffectTargets<'_>,
-    ) -> EffectBodies {
+    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
         // The parameter of a difference, or zero if the effect does not have it.
         let value = |i: usize| {
             let term = terms.iter().find(|term| term.symbol == DIFFERENCES[i].0);
@@ -165,11 +145,7 @@ fn is_only_one(parts: &[ModelPart], part: usize) -> bool {
 /// Mass, moments and inertia in the order of the differences.
 fn components(inertial: &PartInertia) -> Vec<&'static str> {
     let (mass, moments, inertia) = match inertial {
-        PartInertia::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => (mass, centre, inertia),
+        PartInertia::AboutCentre { mass, centre, inertia } => (mass, centre, inertia),
         PartInertia::Linear {
             mass,
             first_moment,
@@ -188,8 +164,7 @@ fn components(inertial: &PartInertia) -> Vec<&'static str> {
 /// The parameters in mass and inertia of a part, which other parts may share.
 /// The centre is not included, because it describes one part only.
 fn shared_parameters(inertial: &PartInertia) -> Vec<crate::ParameterIdx> {
-    let (PartInertia::AboutCentre { mass, inertia, .. }
-    | PartInertia::Linear { mass, inertia, .. }) = inertial;
+    let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) = inertial;
     let mut found = Vec::new();
     for exact in std::iter::once(mass).chain(inertia) {
         exact.for_each_symbol(&mut |symbol| {

@@ -33,13 +33,7 @@ impl MechanicsEntry for PlacementMechanics {
         None
     }
 
-    fn check_place(
-        &self,
-        name: &SpannedName,
-        place: EffectPlace,
-        scene: &EffectTargets<'_>,
-        log: &mut DiagnosticLog,
-    ) {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
         // The effect corrects only masses with two different places.
         if displaced_masses(place, &scene.points.points, scene.lumped_masses).is_empty() {
             log.push(
@@ -55,19 +49,14 @@ impl MechanicsEntry for PlacementMechanics {
 
     /// Masses at the point of the forces, minus masses whose moments are at `moment_at`. Forces cancel, and a moment
     /// remains.
-    fn bodies(
-        &self,
-        terms: &[EffectTerm],
-        places: &[EffectPlace],
-        scene: &EffectTargets<'_>,
-    ) -> EffectBodies {
+    fn bodies(&self, terms: &[EffectTerm], places: &[EffectPlace], scene: &EffectTargets<'_>) -> EffectBodies {
         let mut bodies = EffectBodies::default();
         for term in terms {
             let mass = ExactExpression::Symbol(ModelSymbol::Parameter(term.parameter));
             // All lumped masses at all places of the effect share the parameter.
-            let all = places.iter().flat_map(|place| {
-                displaced_masses(*place, &scene.points.points, scene.lumped_masses)
-            });
+            let all = places
+                .iter()
+                .flat_map(|place| displaced_masses(*place, &scene.points.points, scene.lumped_masses));
             // The first mass has both places at the point; the second one, negative, keeps the places of the file.
             for lump in all {
                 bodies.lumped_masses.push(LumpedMass {
@@ -108,11 +97,7 @@ impl MechanicsEntry for PlacementMechanics {
 
 /// Lumped masses whose forces are taken at a point, and whose moments are taken at another one.
 /// Such a mass is on the frame of the point, and its forces act exactly there.
-fn displaced_masses<'a>(
-    place: EffectPlace,
-    points: &[FramePoint],
-    all: &'a [LumpedMass],
-) -> Vec<&'a LumpedMass> {
+fn displaced_masses<'a>(place: EffectPlace, points: &[FramePoint], all: &'a [LumpedMass]) -> Vec<&'a LumpedMass> {
     let EffectPlace::Point(point) = place else {
         return Vec::new();
     };

@@ -40,13 +40,7 @@ impl MechanicsEntry for RodMechanics {
         None
     }
 
-    fn check_place(
-        &self,
-        name: &SpannedName,
-        place: EffectPlace,
-        scene: &EffectTargets<'_>,
-        log: &mut DiagnosticLog,
-    ) {
+    fn check_place(&self, name: &SpannedName, place: EffectPlace, scene: &EffectTargets<'_>, log: &mut DiagnosticLog) {
         // A rod needs the line between the two points of a drive.
         if !is_line(scene.drives, place) {
             log.push(

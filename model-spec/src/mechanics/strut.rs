@@ -73,9 +73,7 @@ impl MechanicsEntry for StrutMechanics {
     fn pairs(&self, mechanism: &Mechanism) -> Option<Vec<[PointIdx; 2]>> {
         let points = &mechanism.points;
         // Points of loops and drives have another purpose.
-        let is_free = |p: &PointIdx| {
-            !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p)
-        };
+        let is_free = |p: &PointIdx| !is_loop_end(&mechanism.loops, *p) && !is_drive_end(&mechanism.drives, *p);
         let free: Vec<PointIdx> = (0..points.len()).map(PointIdx).filter(is_free).collect();
         let mut pairs = Vec::new();
         // Each pair of free points on different frames.

@@ -94,11 +94,7 @@ impl MechanicsEntry for TiltMechanics {
     }
 
     /// Applies the transposed rotations, the outermost first: with R = Rz(tz) Ry(ty) Rx(tx) this is R' g = Rx' Ry' Rz' g.
-    fn gravity(
-        &self,
-        effect: &ModelEffect,
-        mut gravity: [ExactExpression; 3],
-    ) -> [ExactExpression; 3] {
+    fn gravity(&self, effect: &ModelEffect, mut gravity: [ExactExpression; 3]) -> [ExactExpression; 3] {
         // Each rotation mixes the two components that are not along its axis.
         for (symbol, [from, to]) in [("tz", [0, 1]), ("ty", [2, 0]), ("tx", [1, 2])] {
             // An angle of zero was dropped, so its rotation is skipped.

@@ -59,9 +59,7 @@ fn a_file_that_is_no_text_in_utf_8() {
     let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("latin.toml");
     std::fs::write(&path, b"schema = 1\nname = \"arm\" # m\xFCde\n").unwrap();
     let found = modelmill_spec::load_file(&path).unwrap_err();
-    let says = found
-        .render(false)
-        .replace(&*path.to_string_lossy(), "latin.toml");
+    let says = found.render(false).replace(&*path.to_string_lossy(), "latin.toml");
     insta::assert_snapshot!(says, @r#"
     error: this file is not UTF-8 text
      --> latin.toml:2:17
@@ -123,10 +121,7 @@ fn what_cannot_move_is_told_where_to_look() {
             && !says.contains("mark 1 coordinate more"),
         "{says}"
     );
-    let idle = failure(&text.replace(
-        "crank = { nominal = 1.1 }",
-        "crank = { nominal = 1.1, passive = true }",
-    ));
+    let idle = failure(&text.replace("crank = { nominal = 1.1 }", "crank = { nominal = 1.1, passive = true }"));
     let says = idle.render(false);
     assert!(says.contains("every coordinate is `passive`"), "{says}");
 }
@@ -190,11 +185,7 @@ fn color_marks_the_same_text() {
 #[test]
 fn a_thousand_nested_brackets() {
     for (open, close) in [("[", "]"), ("{ a = ", " }")] {
-        let text = format!(
-            "schema = 1\nx = {}1{}\n",
-            open.repeat(1000),
-            close.repeat(1000)
-        );
+        let text = format!("schema = 1\nx = {}1{}\n", open.repeat(1000), close.repeat(1000));
         let found = failure(&text);
         assert!(
             found.render(false).contains("at most 80 deep"),
@@ -206,16 +197,8 @@ fn a_thousand_nested_brackets() {
     }
     let dotted = format!("x{} = 1\n[y{}]\n", ".x".repeat(1000), ".y".repeat(1000));
     failure(&dotted);
-    let parentheses = format!(
-        "gravity = [\"{}1{}\", 0, 0]",
-        "(".repeat(1000),
-        ")".repeat(1000)
-    );
-    assert!(
-        failure(&parentheses)
-            .render(false)
-            .contains("nested too deeply")
-    );
+    let parentheses = format!("gravity = [\"{}1{}\", 0, 0]", "(".repeat(1000), ")".repeat(1000));
+    assert!(failure(&parentheses).render(false).contains("nested too deeply"));
     let minus = format!(
         "gravity = [\"{}1\", \"1{}\", \"1{}\"]",
         "-".repeat(3000),
@@ -259,9 +242,7 @@ fn a_file_of_megabytes() {
 
 #[test]
 fn every_error_says_where() {
-    let found = failure(
-        "schema = 1\nname = \"x\"\ngravity = [\"q\", 0, 0]\nframe = 1\ncoordinates = { q = 1 }\n",
-    );
+    let found = failure("schema = 1\nname = \"x\"\ngravity = [\"q\", 0, 0]\nframe = 1\ncoordinates = { q = 1 }\n");
     let mut places = Vec::new();
     for diagnostic in &found.diagnostics {
         assert_eq!(diagnostic.severity, DiagnosticSeverity::Error);
@@ -274,11 +255,7 @@ fn every_error_says_where() {
 #[test]
 fn a_file_that_cannot_be_read() {
     let failure = modelmill_spec::load_file(Path::new("no/such/model.toml")).unwrap_err();
-    assert!(
-        failure
-            .render(false)
-            .contains("cannot read `no/such/model.toml`")
-    );
+    assert!(failure.render(false).contains("cannot read `no/such/model.toml`"));
 }
 
 #[test]

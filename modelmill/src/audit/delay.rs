@@ -6,12 +6,12 @@ use modelmill_identify::{DelayAudit, DelayEstimate, ForceDelays, RecordingNote};
 use super::rows::AuditRows;
 use super::thresholds::{
     COMMON_DELAY_FEWEST_DRIVES, DELAY_LEAST_GAIN, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS,
-    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONGEST_DELAY_S, LONGEST_DELAY_SHARE,
-    LONGEST_DELAY_STEPS, PROMPT_DRIVE_MOST_HALF_WIDTH, SAME_DELAY_TOLERANCE_STEPS,
-    SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS, SINGLE_DELAY_LEAST_STEPS,
+    DELAY_REVERSAL_RATE_SHARE, DELAY_WARNING_GAIN, LONGEST_DELAY_S, LONGEST_DELAY_SHARE, LONGEST_DELAY_STEPS,
+    PROMPT_DRIVE_MOST_HALF_WIDTH, SAME_DELAY_TOLERANCE_STEPS, SINGLE_DELAY_LEAST_GAIN, SINGLE_DELAY_LEAST_HALF_WIDTHS,
+    SINGLE_DELAY_LEAST_STEPS,
 };
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::{percent, significant};
 
 /// Largest number of samples over all drives, spread over the recording.
@@ -41,9 +41,7 @@ impl ForceDelayAudit {
             .min(LONGEST_DELAY_SHARE * duration);
         // Both ends are excluded by the longest delay, so that every shifted sample exists.
         let from = run.time.partition_point(|t| *t < run.time[0] + longest);
-        let to = run
-            .time
-            .partition_point(|t| *t <= run.time[n - 1] - longest);
+        let to = run.time.partition_point(|t| *t <= run.time[n - 1] - longest);
         let most = (LOOKED_AT / forces.len().max(1)).max(FEWEST);
         let every = ((to - from) / most).max(1);
         let samples: Vec<usize> = (from..to).step_by(every).collect();
@@ -88,16 +86,12 @@ impl ForceDelayAudit {
                 > DELAY_LEAST_HALF_WIDTHS * one.half_width.hypot(other.half_width)
                     + SAME_DELAY_TOLERANCE_STEPS * self.step
         };
-        let agree = (alone.iter().enumerate())
-            .all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
+        let agree = (alone.iter().enumerate()).all(|(d, one)| !alone[..d].iter().any(|other| differ(one, other)));
         // At least two drives must show the delay on their own.
-        let telling = |one: &&DelayEstimate| {
-            one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0
-        };
-        let agree = agree
-            && alone.iter().filter(telling).count() >= alone.len().min(COMMON_DELAY_FEWEST_DRIVES);
-        let is_there = self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS)
-            && self.gain(1) > DELAY_LEAST_GAIN;
+        let telling = |one: &&DelayEstimate| one.seconds.abs() > one.half_width && one.seconds * all.seconds > 0.0;
+        let agree = agree && alone.iter().filter(telling).count() >= alone.len().min(COMMON_DELAY_FEWEST_DRIVES);
+        let is_there =
+            self.is_clear(all, DELAY_LEAST_HALF_WIDTHS, DELAY_LEAST_STEPS) && self.gain(1) > DELAY_LEAST_GAIN;
         (agree && is_there).then_some(all)
     }
 
@@ -110,29 +104,20 @@ impl ForceDelayAudit {
         } = &self.delays;
         // A delayed drive must be clear and must reduce its own residual.
         let late: Vec<usize> = (0..alone.len())
-            .filter(|d| {
-                self.is_clear(
-                    alone[*d],
-                    SINGLE_DELAY_LEAST_HALF_WIDTHS,
-                    SINGLE_DELAY_LEAST_STEPS,
-                )
-            })
+            .filter(|d| self.is_clear(alone[*d], SINGLE_DELAY_LEAST_HALF_WIDTHS, SINGLE_DELAY_LEAST_STEPS))
             .filter(|d| left[2][*d] < (1.0 - SINGLE_DELAY_LEAST_GAIN) * left[0][*d])
             .collect();
-        let Some(least) = (late.iter().map(|d| alone[*d].seconds.abs())).min_by(f64::total_cmp)
-        else {
+        let Some(least) = (late.iter().map(|d| alone[*d].seconds.abs())).min_by(f64::total_cmp) else {
             return Vec::new();
         };
         let is_late = |d: usize| late.contains(&d);
         // The other drives must show that the common clock is correct.
         let others = || (0..alone.len()).filter(|d| !is_late(*d)).map(|d| alone[d]);
         let in_time = others().all(|one| {
-            one.seconds.abs()
-                < DELAY_LEAST_HALF_WIDTHS * one.half_width + SAME_DELAY_TOLERANCE_STEPS * self.step
+            one.seconds.abs() < DELAY_LEAST_HALF_WIDTHS * one.half_width + SAME_DELAY_TOLERANCE_STEPS * self.step
         });
         let known = others().any(|one| one.half_width < PROMPT_DRIVE_MOST_HALF_WIDTH * least);
-        let same_side = late.iter().all(|d| alone[*d].seconds > 0.0)
-            || late.iter().all(|d| alone[*d].seconds < 0.0);
+        let same_side = late.iter().all(|d| alone[*d].seconds > 0.0) || late.iter().all(|d| alone[*d].seconds < 0.0);
         if in_time && known && same_side {
             late
         } else {
@@ -191,16 +176,13 @@ impl ForceDelayAudit {
         // The delays of single drives show how well they agree.
         let mut each = String::new();
         if names.len() > 1 {
-            let of = names
-                .iter()
-                .zip(&self.delays.by_channel)
-                .map(|(name, one)| {
-                    format!(
-                        "`{name}` {} +- {}",
-                        rounded_text(one.seconds / self.step),
-                        significant(one.half_width / self.step, 2)
-                    )
-                });
+            let of = names.iter().zip(&self.delays.by_channel).map(|(name, one)| {
+                format!(
+                    "`{name}` {} +- {}",
+                    rounded_text(one.seconds / self.step),
+                    significant(one.half_width / self.step, 2)
+                )
+            });
             let of: Vec<String> = of.collect();
             each = format!(" Delay of each drive, in samples: {}.", of.join(", "));
         }
@@ -240,8 +222,7 @@ impl ForceDelayAudit {
 
     /// The residuals with and without the delay, as a sentence.
     fn gain_text(&self, with: usize) -> String {
-        let [before, after] =
-            [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
+        let [before, after] = [0, with].map(|which| percent(Some(geometric_mean(&self.delays.residuals[which]))));
         format!(
             " With the delay the best fit has an error of {after} instead of {before} (geometric mean over the drives, away from reversals)."
         )
@@ -259,11 +240,7 @@ impl ForceDelayAudit {
 
 /// The sign of a delay as a word.
 fn direction_word(delay: DelayEstimate) -> &'static str {
-    if delay.seconds > 0.0 {
-        "later"
-    } else {
-        "earlier"
-    }
+    if delay.seconds > 0.0 { "later" } else { "earlier" }
 }
 
 /// The geometric mean of positive numbers.

@@ -16,13 +16,12 @@ use nalgebra::DVector;
 
 use super::rows::AuditRows;
 use super::thresholds::{
-    EVENT_FEWEST_FILTER_WIDTHS, EVENT_LEAST_FORCE_SHARE, EVENT_LULL_FILTER_WIDTHS,
-    EVENT_RESIDUAL_FACTOR, EVENT_REVERSAL_RATE_SHARE, EVENTS_MOST_DURATION_SHARE, MOST_EVENTS,
-    NEIGHBOUR_MOST_DISTANCE_SIGMAS, REPEATED_LEAST_RESIDUAL_SHARE, SHORTEST_EVENT_S,
-    USUAL_RESIDUAL_SHARE,
+    EVENT_FEWEST_FILTER_WIDTHS, EVENT_LEAST_FORCE_SHARE, EVENT_LULL_FILTER_WIDTHS, EVENT_RESIDUAL_FACTOR,
+    EVENT_REVERSAL_RATE_SHARE, EVENTS_MOST_DURATION_SHARE, MOST_EVENTS, NEIGHBOUR_MOST_DISTANCE_SIGMAS,
+    REPEATED_LEAST_RESIDUAL_SHARE, SHORTEST_EVENT_S, USUAL_RESIDUAL_SHARE,
 };
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::significant;
 
 /// Number of samples that are evaluated in a short run.
@@ -50,11 +49,7 @@ pub(crate) struct ContactEvent {
 }
 
 /// Notes on the events of a segment. With `leave_out`, their forces are excluded.
-pub(super) fn event_notes(
-    model: &Model,
-    data: &mut RecordingSegment,
-    leave_out: bool,
-) -> Vec<RecordingNote> {
+pub(super) fn event_notes(model: &Model, data: &mut RecordingSegment, leave_out: bool) -> Vec<RecordingNote> {
     let events = events(model, data).unwrap_or_default();
     let names = model.drives();
     let mut notes = Vec::new();
@@ -93,9 +88,7 @@ pub(super) fn event_notes(
             kind: "contact_event".to_owned(),
             at: drives.clone().map(|(d, _, _)| names[*d].clone()).collect(),
             estimates: drives
-                .map(|(d, largest, _)| {
-                    EstimatedQuantity::new("largest", *largest, model.force_unit(*d))
-                })
+                .map(|(d, largest, _)| EstimatedQuantity::new("largest", *largest, model.force_unit(*d)))
                 .collect(),
             recordings: vec![data.run.file.clone()],
             interval: Some([event.from, event.to]),
@@ -155,9 +148,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         // Short lulls belong to the event about them, and so does a reversal.
         let mut end = i;
         let mut lull = 0;
-        while i < flagged.len()
-            && (flagged[i] || (end > start && lull < EVENT_LULL_FILTER_WIDTHS * together))
-        {
+        while i < flagged.len() && (flagged[i] || (end > start && lull < EVENT_LULL_FILTER_WIDTHS * together)) {
             if flagged[i] {
                 end = i + 1;
                 lull = 0;
@@ -168,10 +159,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         }
         // The interval is widened by half the filter, which smears its ends.
         let reach = |k: usize| run.time[samples[k.min(samples.len() - 1)]];
-        let [from, to] = [
-            reach(start.saturating_sub(together / 2)),
-            reach(end + together / 2),
-        ];
+        let [from, to] = [reach(start.saturating_sub(together / 2)), reach(end + together / 2)];
         let lasts = |end: usize| reach(end - 1) - reach(start) >= SHORTEST_EVENT_S;
         if end > start && lasts(end) {
             // A drive belongs to the event unless its residual repeats elsewhere.
@@ -192,8 +180,7 @@ pub(crate) fn events(model: &Model, data: &RecordingSegment) -> Option<Vec<Conta
         i = i.max(start + 1);
     }
     // What happens often or for long is no event.
-    let is_rare = events.len() <= MOST_EVENTS
-        && (lasted as f64) < EVENTS_MOST_DURATION_SHARE * flagged.len() as f64;
+    let is_rare = events.len() <= MOST_EVENTS && (lasted as f64) < EVENTS_MOST_DURATION_SHARE * flagged.len() as f64;
     is_rare.then_some(events)
 }
 
@@ -225,17 +212,10 @@ struct ResidualLevel {
 
 impl UnexplainedForces {
     /// Fits the model at the given samples; `None` if a pose has no solution or the fit fails.
-    fn new(
-        model: &Model,
-        data: &RecordingSegment,
-        forces: &[Vec<f64>],
-        samples: &[usize],
-    ) -> Option<Self> {
+    fn new(model: &Model, data: &RecordingSegment, forces: &[Vec<f64>], samples: &[usize]) -> Option<Self> {
         let drives = forces.len();
         let rows = AuditRows::new(model, data, samples)?;
-        let of_samples = samples
-            .iter()
-            .flat_map(|k| forces.iter().map(move |force| force[*k]));
+        let of_samples = samples.iter().flat_map(|k| forces.iter().map(move |force| force[*k]));
         let measured = DVector::from_iterator(samples.len() * drives, of_samples);
         let counts: Vec<bool> = (samples.iter())
             .flat_map(|k| (0..drives).map(move |d| data.run.is_force_measured(d, *k)))
@@ -248,11 +228,7 @@ impl UnexplainedForces {
             .collect();
         let some_count: Vec<bool> = some.iter().map(|row| counts[*row]).collect();
         let some_measured = measured.select_rows(&some);
-        let fit = robust_fit(
-            &rows.regressor.subsample(every),
-            &some_measured,
-            &some_count,
-        )?;
+        let fit = robust_fit(&rows.regressor.subsample(every), &some_measured, &some_count)?;
         let mut rest = &measured - rows.regressor.multiply(fit.values.as_slice());
         for (rest, _) in rest.iter_mut().zip(&counts).filter(|(_, counts)| !**counts) {
             *rest = 0.0;
@@ -300,18 +276,10 @@ impl UnexplainedForces {
     /// Whether the residual of a drive at some samples repeats outside of a range, where its position, rate,
     /// acceleration and force are similar. Then it is a law that the model lacks. This is also assumed if there are
     /// no similar states.
-    fn is_repeatable(
-        &self,
-        d: usize,
-        within: &[usize],
-        around: &std::ops::Range<usize>,
-        reverses: &[bool],
-    ) -> bool {
+    fn is_repeatable(&self, d: usize, within: &[usize], around: &std::ops::Range<usize>, reverses: &[bool]) -> bool {
         let n = self.samples();
         let at = |i: usize| i * self.drives + d;
-        let explained: Vec<f64> = (0..n)
-            .map(|i| self.measured[at(i)] - self.rest[at(i)])
-            .collect();
+        let explained: Vec<f64> = (0..n).map(|i| self.measured[at(i)] - self.rest[at(i)]).collect();
         let states = [
             &self.rows.motion[0][d],
             &self.rows.motion[1][d],
@@ -328,18 +296,13 @@ impl UnexplainedForces {
         let others: Vec<usize> = (0..n)
             .filter(|i| !around.contains(i) && !reverses[*i] && self.counts[at(*i)])
             .collect();
-        let some = within
-            .iter()
-            .step_by(within.len().div_ceil(COMPARED).max(1));
+        let some = within.iter().step_by(within.len().div_ceil(COMPARED).max(1));
         let (mut alone, mut asked) = (0, 0);
         for i in some {
             let mut near: Vec<(f64, usize)> = others
                 .iter()
                 .map(|k| {
-                    let apart = states
-                        .iter()
-                        .zip(scales)
-                        .map(|(x, s)| (s * (x[*i] - x[*k])).powi(2));
+                    let apart = states.iter().zip(scales).map(|(x, s)| (s * (x[*i] - x[*k])).powi(2));
                     (apart.sum::<f64>(), *k)
                 })
                 .collect();
@@ -349,16 +312,13 @@ impl UnexplainedForces {
             }
             near.select_nth_unstable_by(NEIGHBOURS - 1, |a, b| a.0.total_cmp(&b.0));
             let near = &near[..NEIGHBOURS];
-            let is_near = near.iter().all(|(apart, _)| {
-                *apart < NEIGHBOUR_MOST_DISTANCE_SIGMAS * NEIGHBOUR_MOST_DISTANCE_SIGMAS
-            });
+            let is_near = near
+                .iter()
+                .all(|(apart, _)| *apart < NEIGHBOUR_MOST_DISTANCE_SIGMAS * NEIGHBOUR_MOST_DISTANCE_SIGMAS);
             // The mean residual of the neighbours is compared with that of the event.
-            let theirs =
-                near.iter().map(|(_, k)| self.rest[at(*k)]).sum::<f64>() / NEIGHBOURS as f64;
+            let theirs = near.iter().map(|(_, k)| self.rest[at(*k)]).sum::<f64>() / NEIGHBOURS as f64;
             let own = self.rest[at(*i)];
-            alone += usize::from(
-                is_near && theirs * own.signum() < REPEATED_LEAST_RESIDUAL_SHARE * own.abs(),
-            );
+            alone += usize::from(is_near && theirs * own.signum() < REPEATED_LEAST_RESIDUAL_SHARE * own.abs());
         }
         2 * alone < asked
     }

@@ -13,7 +13,7 @@ use super::rows::AuditRows;
 use super::thresholds::{CORRECTION_MOST_RATIO, GRAVITY_LEAST_ERROR};
 use super::{AuditFinding, GRAVITY};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
 /// A finding if reversed gravity explains the forces far better. `measured` are the forces at the samples, interleaved.

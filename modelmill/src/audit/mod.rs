@@ -16,7 +16,7 @@ use modelmill_identify::{ChannelRegressor, ForceAudit, RecordingNote, WiringFaul
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 use delay::ForceDelayAudit;
 use thresholds::{
@@ -108,9 +108,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     let with_delay = late.as_ref().and_then(ForceDelayAudit::residual_with_delay);
     let mut notes = Vec::new();
     // Forces delayed by a large part of a period resemble those of another drive.
-    if error > WIRING_LEAST_ERROR
-        && with_delay.is_none_or(|left| left > CORRECTION_MOST_RATIO * error)
-    {
+    if error > WIRING_LEAST_ERROR && with_delay.is_none_or(|left| left > CORRECTION_MOST_RATIO * error) {
         let drives = model.drives();
         let columns = Remedy::option(OptionName::Columns);
         if let Some((suspect, [before, after])) = as_it_is.find_wiring_fault(&measured)
@@ -123,10 +121,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
                 WiringFault::Swapped(a, b) => (
                     EXCHANGED,
                     vec![a, b],
-                    format!(
-                        "the forces of `{}` and `{}` seem to be exchanged",
-                        drives[a], drives[b]
-                    ),
+                    format!("the forces of `{}` and `{}` seem to be exchanged", drives[a], drives[b]),
                 ),
                 WiringFault::Reversed(_) if drives.len() == 2 => (
                     WRONG_SIGN,
@@ -160,9 +155,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
     }
     // Reversed gravity is tested after the motion, whose changes may look like it.
     if notes.is_empty() {
-        notes.extend(gravity::reversed_gravity_finding(
-            model, data, &samples, &measured,
-        ));
+        notes.extend(gravity::reversed_gravity_finding(model, data, &samples, &measured));
     }
     if notes.is_empty() {
         notes = beside;
@@ -176,11 +169,7 @@ fn findings(model: &Model, data: &RecordingSegment) -> Vec<AuditFinding> {
 }
 
 /// Signs and units of the forces, compared with the forces at the nominal values.
-fn nominal_force_findings(
-    model: &Model,
-    data: &RecordingSegment,
-    samples: &[usize],
-) -> Vec<AuditFinding> {
+fn nominal_force_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Vec<AuditFinding> {
     let Some(regressor) = regressor(model, data, samples, &|_| {}) else {
         return Vec::new();
     };
@@ -211,9 +200,7 @@ type MotionColumns = [Vec<Vec<f64>>; 3];
 type MotionChange<'a> = dyn Fn(&mut MotionColumns) + 'a;
 /// Forces at some samples, interleaved by drive.
 fn interleave_forces(forces: &[Vec<f64>], samples: &[usize]) -> DVector<f64> {
-    let rows = samples
-        .iter()
-        .flat_map(|k| forces.iter().map(move |force| force[*k]));
+    let rows = samples.iter().flat_map(|k| forces.iter().map(move |force| force[*k]));
     DVector::from_iterator(samples.len() * forces.len(), rows)
 }
 
@@ -254,9 +241,7 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
     let measured = interleave_forces(forces, &samples);
     // The error without a change is the reference; it does not exist if poses cannot be reached.
     let now = force_audit(model, data, &samples, &|_| {}).and_then(|audit| audit.error(&measured));
-    let limit = now.map_or(UNREACHABLE_MOST_ERROR, |error| {
-        CORRECTION_MOST_RATIO * error
-    });
+    let limit = now.map_or(UNREACHABLE_MOST_ERROR, |error| CORRECTION_MOST_RATIO * error);
     // Only changes that reduce the error clearly are kept, the best first.
     let mut tried: Vec<(&ColumnHypothesis, f64)> = hypotheses
         .iter()
@@ -271,12 +256,10 @@ fn motion_findings(model: &Model, data: &RecordingSegment, samples: &[usize]) ->
         return Vec::new();
     };
     // Several coordinates may explain the forces equally well by their sign.
-    let alike = tried.iter().filter(|(one, other)| {
-        one.kind == WRONG_SIGN && *other <= (1.0 + SAME_ERROR_TOLERANCE) * error + EXACT
-    });
-    let turned: Vec<&str> = alike
-        .flat_map(|(one, _)| one.at.iter().map(String::as_str))
-        .collect();
+    let alike = tried
+        .iter()
+        .filter(|(one, other)| one.kind == WRONG_SIGN && *other <= (1.0 + SAME_ERROR_TOLERANCE) * error + EXACT);
+    let turned: Vec<&str> = alike.flat_map(|(one, _)| one.at.iter().map(String::as_str)).collect();
     // If several signs explain the same, all coordinates are named.
     let (at, says) = if first.kind == WRONG_SIGN && turned.len() > 1 {
         let says = format!(
@@ -400,7 +383,5 @@ fn regressor(
         qdd: states[2].iter().map(Vec::as_slice).collect(),
         load: load.iter().map(Vec::as_slice).collect(),
     };
-    ModelEvaluator::new(&model.derivation)
-        .regressor(&states)
-        .ok()
+    ModelEvaluator::new(&model.derivation).regressor(&states).ok()
 }

@@ -45,9 +45,7 @@ fn oddity(measured: &[f64], nominal: &[f64]) -> Option<ForceOddity> {
         return None;
     }
     // Units are tested first: their ratios are far from those of gears and wrong nominal values.
-    let about = |factor: f64| {
-        (factor / NOMINAL_FORCE_FACTOR..factor * NOMINAL_FORCE_FACTOR).contains(&ratio)
-    };
+    let about = |factor: f64| (factor / NOMINAL_FORCE_FACTOR..factor * NOMINAL_FORCE_FACTOR).contains(&ratio);
     if about(1e-3) {
         Some(ForceOddity::Misread(ForceMisreading::TooSmall))
     } else if about(1e3) {
@@ -70,10 +68,9 @@ pub(crate) fn oddities(
     upside_down: Option<&[Vec<f64>]>,
     file: &str,
 ) -> Vec<AuditFinding> {
-    let found: Vec<(&ModelDrive, ForceOddity)> =
-        (mechanism.drives.iter().zip(measured).zip(nominal))
-            .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
-            .collect();
+    let found: Vec<(&ModelDrive, ForceOddity)> = (mechanism.drives.iter().zip(measured).zip(nominal))
+        .filter_map(|((drive, measured), nominal)| Some((drive, oddity(measured, nominal)?)))
+        .collect();
     // Drives with the same mistake are reported together.
     let mut told: Vec<AuditFinding> = [
         ForceMisreading::Turned,
@@ -87,8 +84,8 @@ pub(crate) fn oddities(
             .filter(|(_, oddity)| *oddity == ForceOddity::Misread(which))
             .map(|(drive, _)| *drive)
             .collect();
-        let may_hang = which == ForceMisreading::Turned
-            && upside_down.is_some_and(|forces| is_sign_explained(forces, measured));
+        let may_hang =
+            which == ForceMisreading::Turned && upside_down.is_some_and(|forces| is_sign_explained(forces, measured));
         (!drives.is_empty()).then(|| misreading_finding(mechanism, &drives, which, may_hang, file))
     })
     .collect();
@@ -109,9 +106,7 @@ pub(crate) fn oddities(
 fn is_sign_explained(forces: &[Vec<f64>], measured: &[Vec<f64>]) -> bool {
     let pairs = measured.iter().zip(forces);
     let alike = pairs.map(|(measured, forces)| correlation_and_ratio(measured, forces).0);
-    let clear: Vec<f64> = alike
-        .filter(|alike| alike.abs() > NOMINAL_LEAST_CORRELATION)
-        .collect();
+    let clear: Vec<f64> = alike.filter(|alike| alike.abs() > NOMINAL_LEAST_CORRELATION).collect();
     !clear.is_empty() && clear.iter().all(|alike| *alike > 0.0)
 }
 
@@ -162,11 +157,7 @@ fn misreading_finding(
         OptionSetting::new(OptionName::Columns, column)
     });
     let (kind, what, if_so) = match which {
-        ForceMisreading::Turned => (
-            WRONG_SIGN,
-            "of the opposite sign",
-            "measured in the opposite direction",
-        ),
+        ForceMisreading::Turned => (WRONG_SIGN, "of the opposite sign", "measured in the opposite direction"),
         ForceMisreading::TooSmall => (UNITS, "about 1000 times as small", "in kN or kN m"),
         ForceMisreading::TooLarge => (UNITS, "about 1000 times as large", "in mN or mN m"),
     };
@@ -196,11 +187,7 @@ mod tests {
 
     #[test]
     fn gravity_may_turn_forces_if_that_is_so_of_all() {
-        let force = |phase: f64| {
-            (0..200)
-                .map(|k| (0.1 * f64::from(k) + phase).sin())
-                .collect()
-        };
+        let force = |phase: f64| (0..200).map(|k| (0.1 * f64::from(k) + phase).sin()).collect();
         let [one, other, opposite]: [Vec<f64>; 3] = [0.0, 1.5, std::f64::consts::PI].map(force);
         let measured = [one.clone(), other.clone()];
         assert!(is_sign_explained(&measured, &measured));
@@ -223,18 +210,9 @@ mod tests {
             oddity(&measured, &nominal)
         };
         assert_eq!(of(1.3, 0.1), None);
-        assert_eq!(
-            of(-0.8, 0.1),
-            Some(ForceOddity::Misread(ForceMisreading::Turned))
-        );
-        assert_eq!(
-            of(1.4e-3, 0.1),
-            Some(ForceOddity::Misread(ForceMisreading::TooSmall))
-        );
-        assert_eq!(
-            of(-7e2, 0.1),
-            Some(ForceOddity::Misread(ForceMisreading::TooLarge))
-        );
+        assert_eq!(of(-0.8, 0.1), Some(ForceOddity::Misread(ForceMisreading::Turned)));
+        assert_eq!(of(1.4e-3, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooSmall)));
+        assert_eq!(of(-7e2, 0.1), Some(ForceOddity::Misread(ForceMisreading::TooLarge)));
         let Some(ForceOddity::BeforeGear(ratio)) = of(-1.0 / 101.0, 0.1) else {
             panic!("a gear");
         };

@@ -6,7 +6,7 @@ use modelmill_identify::ChannelRegressor;
 use nalgebra::DMatrix;
 
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Number of further columns of a drive: rate, its sign, acceleration, an offset, friction with the square of the
 /// rate, and friction that differs by direction.
@@ -58,11 +58,7 @@ impl AuditRows {
     }
 
     /// The time derivative of the regressor and the further columns, per s.
-    pub(super) fn slope(
-        model: &Model,
-        data: &RecordingSegment,
-        samples: &[usize],
-    ) -> Option<ChannelRegressor> {
+    pub(super) fn slope(model: &Model, data: &RecordingSegment, samples: &[usize]) -> Option<ChannelRegressor> {
         let around = DriveStencil::new(model, data, samples)?;
         let n = around.rates[1].len();
         // The regressor is differentiated by differences, the further columns by their own formulas.
@@ -111,8 +107,7 @@ impl DriveStencil {
         let mut drives = Vec::new();
         for samples in &samples {
             let evaluator = ModelEvaluator::new(&model.derivation);
-            let found = SampledStates::new(data, samples)
-                .with_states(|states| evaluator.drive_motion(states));
+            let found = SampledStates::new(data, samples).with_states(|states| evaluator.drive_motion(states));
             // Positions come first, rates behind them, the Jacobian last.
             let mut positions = found.ok()?;
             positions.truncate(2 * n);
@@ -141,14 +136,8 @@ impl DriveStencil {
         let step = self.span(i);
         let acceleration = (v_after - v_before) / step;
         // At the ends of a recording one of the neighbours is the sample itself.
-        let slopes =
-            [(v - v_before, t - t_before), (v_after - v, t_after - t)].map(|(change, step)| {
-                if step > 0.0 {
-                    change / step
-                } else {
-                    acceleration
-                }
-            });
+        let slopes = [(v - v_before, t - t_before), (v_after - v, t_after - t)]
+            .map(|(change, step)| if step > 0.0 { change / step } else { acceleration });
         let jerk = 2.0 * (slopes[1] - slopes[0]) / step;
         let sign = if v == 0.0 { 0.0 } else { v.signum() };
         ExtraDriveColumns {
@@ -165,11 +154,7 @@ impl DriveStencil {
     }
 
     /// Appends the further columns of all drives, or their derivatives as `chosen` selects, behind those of the model.
-    fn add_extra_columns(
-        &self,
-        rows: &mut DMatrix<f64>,
-        chosen: impl Fn(ExtraDriveColumns) -> [f64; MORE],
-    ) {
+    fn add_extra_columns(&self, rows: &mut DMatrix<f64>, chosen: impl Fn(ExtraDriveColumns) -> [f64; MORE]) {
         let (n, width) = (self.rates[1].len(), rows.ncols());
         let owned = std::mem::replace(rows, DMatrix::zeros(0, 0));
         *rows = owned.resize_horizontally(width + MORE * n, 0.0);
@@ -189,11 +174,7 @@ fn reach(data: &RecordingSegment) -> usize {
     let time = &data.run.time;
     let rate = (time.len() - 1) as f64 / (time[time.len() - 1] - time[0]);
     let band = data.run.prepared.band_hz.unwrap_or(rate);
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few samples"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few samples")]
     let reach = (REACH * rate / band) as usize;
     reach.clamp(1, time.len().max(2) / 2)
 }
@@ -215,9 +196,7 @@ pub(super) fn regressor_with_reversed_gravity(
     let evaluator = ModelEvaluator::new(&model.derivation);
     // f(-g) = f(g) - 2 f(g) at standstill, since only gravity acts there.
     let at_rest = SampledStates::new(data, samples).at_standstill();
-    let at_rest = at_rest
-        .with_states(|states| evaluator.regressor(states))
-        .ok()?;
+    let at_rest = at_rest.with_states(|states| evaluator.regressor(states)).ok()?;
     Some(regressor(model, data, samples)? - 2.0 * at_rest)
 }
 
@@ -233,8 +212,7 @@ impl SampledStates {
     /// The states of a segment at some samples.
     fn new(data: &RecordingSegment, samples: &[usize]) -> Self {
         Self {
-            motion: [&data.run.q, &data.run.qd, &data.run.qdd]
-                .map(|all| select_samples(all, samples)),
+            motion: [&data.run.q, &data.run.qd, &data.run.qdd].map(|all| select_samples(all, samples)),
             load: select_samples(data.run.force.as_deref().unwrap_or(&[]), samples),
         }
     }

@@ -7,8 +7,8 @@
 
 use modelmill_codegen::{Derivation, ParameterMonomial, PoseGuard};
 use modelmill_spec::{
-    AddedEffect, ConstantSearch, ConstantValue, EffectKind, Mechanics, Mechanism, ModelConstant,
-    ModelEffect, Scale, Sign,
+    AddedEffect, ConstantSearch, ConstantValue, EffectKind, Mechanics, Mechanism, ModelConstant, ModelEffect, Scale,
+    Sign,
 };
 
 use crate::error::{Error, Outcome};
@@ -42,8 +42,7 @@ pub(crate) struct SingleCandidate {
 impl SingleCandidate {
     /// The symbol of the constant whose value is tried.
     pub(crate) fn range(&self) -> Option<&str> {
-        let is_range =
-            |c: &&(String, String, ConstantSearch)| matches!(c.2, ConstantSearch::Range { .. });
+        let is_range = |c: &&(String, String, ConstantSearch)| matches!(c.2, ConstantSearch::Range { .. });
         let found = self.constants.iter().find(is_range);
         found.map(|(symbol, _, _)| symbol.as_str())
     }
@@ -127,11 +126,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
             continue;
         }
         // A kind with a constant that is neither known nor searched for cannot be tried.
-        if kind
-            .constants
-            .iter()
-            .any(|c| c.search.is_none() && c.value.is_none())
-        {
+        if kind.constants.iter().any(|c| c.search.is_none() && c.value.is_none()) {
             continue;
         }
         // Sums refer to the single entries of this kind by their position after the earlier ones.
@@ -176,9 +171,7 @@ pub(crate) fn candidates(model: &Model) -> Outcome<DerivedCandidates> {
 /// Whether the model has the effect at all of some places already.
 fn has_effect(mechanism: &Mechanism, kind: &EffectKind, spots: &[&CandidatePlace]) -> bool {
     let holds = |effect: &ModelEffect| {
-        let has = |spot: &&CandidatePlace| {
-            effect.places.contains(&spot.place) || effect.other == Some(spot.place)
-        };
+        let has = |spot: &&CandidatePlace| effect.places.contains(&spot.place) || effect.other == Some(spot.place);
         spots.iter().all(has)
     };
     // An effect counts as present only if it acts at all of the places.
@@ -222,9 +215,7 @@ pub(crate) fn single_candidate(
 
 /// Whether the expression of a kind names the load of its place.
 pub(crate) fn is_load_dependent(kind: &EffectKind) -> bool {
-    let mut words = kind
-        .expression
-        .split(|c: char| !c.is_alphanumeric() && c != '_');
+    let mut words = kind.expression.split(|c: char| !c.is_alphanumeric() && c != '_');
     words.any(|word| word == "load")
 }
 
@@ -241,28 +232,17 @@ pub(crate) struct CandidateVariant {
 
 impl CandidateVariant {
     /// Adds an entry as candidate `number`; its parameters and constants get names with that number.
-    pub(crate) fn add(
-        &mut self,
-        mechanism: &Mechanism,
-        kind: &EffectKind,
-        single: &SingleCandidate,
-        number: usize,
-    ) {
+    pub(crate) fn add(&mut self, mechanism: &Mechanism, kind: &EffectKind, single: &SingleCandidate, number: usize) {
         self.singles.push(number);
         let place = single.spots[0].place;
         // Mechanics have only those parameters that act at the place.
         let at_place = (kind.mechanics).and_then(|one| one.parameters_at(mechanism, place));
-        let has = |symbol: &str| {
-            at_place
-                .as_ref()
-                .is_none_or(|those| those.contains(&symbol))
-        };
+        let has = |symbol: &str| at_place.as_ref().is_none_or(|those| those.contains(&symbol));
         // Names are unique by the number of the candidate.
         let symbols = kind.parameters.iter().map(|p| &p.symbol);
-        let searched = (single.constants.iter())
-            .map(|(symbol, name, _)| (symbol.clone(), ConstantValue::Named(name.clone())));
-        let given = (single.given.iter())
-            .map(|(symbol, value)| (symbol.clone(), ConstantValue::Number(*value)));
+        let searched =
+            (single.constants.iter()).map(|(symbol, name, _)| (symbol.clone(), ConstantValue::Named(name.clone())));
+        let given = (single.given.iter()).map(|(symbol, value)| (symbol.clone(), ConstantValue::Number(*value)));
         self.effects.push(AddedEffect {
             kind: kind.name.clone(),
             at: single.spots.iter().map(|spot| spot.name.clone()).collect(),
@@ -286,28 +266,17 @@ impl CandidateVariant {
     /// Derives the columns of its effects alone; `own` effects of the model come before them.
     ///
     /// Fails when the file rejects an effect, or when the derivation fails.
-    pub(crate) fn derive(
-        self,
-        model: &Model,
-        own: usize,
-        singles: &mut [SingleCandidate],
-    ) -> Outcome<Derivation> {
-        let mechanism = &model
-            .loaded
-            .with_additions(&self.constants, &self.effects)?;
+    pub(crate) fn derive(self, model: &Model, own: usize, singles: &mut [SingleCandidate]) -> Outcome<Derivation> {
+        let mechanism = &model.loaded.with_additions(&self.constants, &self.effects)?;
         let mut wanted = Vec::new();
         // The derivation numbers parameters anew, so that their indices are stored here.
         for (number, effect) in self.singles.iter().zip(&mechanism.effects[own..]) {
             let terms = effect.terms.iter();
-            singles[*number].parameters = terms
-                .map(|term| (term.symbol.clone(), term.parameter.0))
-                .collect();
+            singles[*number].parameters = terms.map(|term| (term.symbol.clone(), term.parameter.0)).collect();
             wanted.extend(effect.terms.iter().map(|term| term.parameter.0));
         }
         // Only columns of the candidates are derived; those of the model exist already.
-        let is_wanted = |product: &ParameterMonomial| {
-            product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p))
-        };
+        let is_wanted = |product: &ParameterMonomial| product.0.iter().any(|(p, n)| *n == 1 && wanted.contains(p));
         let mut derivation = modelmill_codegen::derive_columns(mechanism, &is_wanted)
             .map_err(|error| Error::derivation(&model.path, error))?;
         // One candidate without a finite value must not stop the others: it is left out when its columns are checked.
@@ -322,28 +291,19 @@ impl CandidateVariant {
 /// Fails when the derivation fails.
 pub(crate) fn derive_tilt(model: &Model) -> Outcome<Derivation> {
     let names = ["tx", "ty", "tz"].map(|t| (t.to_owned(), format!("candidate_{t}")));
-    let constants = names
-        .each_ref()
-        .map(|(_, name)| named_constant(name, 0.0, "rad"));
+    let constants = names.each_ref().map(|(_, name)| named_constant(name, 0.0, "rad"));
     let tilt = AddedEffect {
         kind: "gravity_tilt".to_owned(),
         at: vec!["base".to_owned()],
-        constants: names
-            .map(|(t, name)| (t, ConstantValue::Named(name)))
-            .to_vec(),
+        constants: names.map(|(t, name)| (t, ConstantValue::Named(name))).to_vec(),
         ..AddedEffect::default()
     };
     let variant = model.loaded.with_additions(&constants, &[tilt])?;
     let reduction = &model.derivation.reduction;
-    let base: Vec<&ParameterMonomial> = reduction
-        .retained
-        .iter()
-        .map(|k| &reduction.products[*k])
-        .collect();
+    let base: Vec<&ParameterMonomial> = reduction.retained.iter().map(|k| &reduction.products[*k]).collect();
     // The tilt changes gravity in all columns of the base.
     let is_base = |product: &ParameterMonomial| base.contains(&product);
-    modelmill_codegen::derive_columns(&variant, &is_base)
-        .map_err(|error| Error::derivation(&model.path, error))
+    modelmill_codegen::derive_columns(&variant, &is_base).map_err(|error| Error::derivation(&model.path, error))
 }
 
 /// A constant of a variant.

@@ -2,19 +2,18 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
-    ForceReadingFault, LocatedEffect, ReadingFaultKind, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, ForceReadingFault,
+    LocatedEffect, ReadingFaultKind, SignConstraint,
 };
 use modelmill_spec::{ActsOn, ConstantSearch, EffectKind, Mechanics};
 use rayon::prelude::*;
 
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 use super::candidates::{
-    CandidateEntry, ChangeCandidate, DerivedCandidates, EvaluationFrequency, SingleCandidate, grid,
-    sign,
+    CandidateEntry, ChangeCandidate, DerivedCandidates, EvaluationFrequency, SingleCandidate, grid, sign,
 };
 use super::numbers::PlaceMotions;
 use super::places::CandidatePlace;
@@ -33,20 +32,11 @@ pub(crate) fn candidate_columns(
     all: &SegmentList<'_>,
 ) -> Outcome<CandidateColumns> {
     // A linear constant is estimated like a parameter, all others are searched.
-    let is_linear = |single: &SingleCandidate| {
-        single
-            .constants
-            .iter()
-            .any(|c| c.2 == ConstantSearch::Linear)
-    };
+    let is_linear = |single: &SingleCandidate| single.constants.iter().any(|c| c.2 == ConstantSearch::Linear);
     // Stage 1: the values of constants, and the rounds in which they are evaluated.
     let grids = grids(candidates, model, all)?;
     // Without linear constants one evaluation of the known effects is enough.
-    let of_known = if candidates.singles.iter().any(is_linear) {
-        2
-    } else {
-        1
-    };
+    let of_known = if candidates.singles.iter().any(is_linear) { 2 } else { 1 };
     // `found[single][round]`; columns that are linear in a constant are evaluated at its values 0 and 1.
     let longest = grids.iter().map(Vec::len).max().unwrap_or(1);
     let rounds = (0..of_known)
@@ -56,8 +46,7 @@ pub(crate) fn candidate_columns(
     let jobs: Vec<(EvaluationFrequency, usize, Vec<usize>)> = rounds
         .map(|(sort, round)| {
             let takes_part = |k: &usize| {
-                candidates.singles[*k].sort == sort
-                    && (sort == EvaluationFrequency::Known || round < grids[*k].len())
+                candidates.singles[*k].sort == sort && (sort == EvaluationFrequency::Known || round < grids[*k].len())
             };
             let of_round = (0..candidates.singles.len()).filter(takes_part);
             (sort, round, of_round.collect())
@@ -90,11 +79,7 @@ pub(crate) fn candidate_columns(
         if let Some((candidate, felt)) = candidate(candidates, entry, &found, &grids) {
             made.push(candidate);
             origins.push(Some((k, felt)));
-        } else if entry
-            .singles
-            .iter()
-            .any(|k| !found[*k].iter().flatten().all(is_finite))
-        {
+        } else if entry.singles.iter().any(|k| !found[*k].iter().flatten().all(is_finite)) {
             undefined.push(effect(candidates, entry));
         }
     }
@@ -149,11 +134,7 @@ pub(crate) fn candidate_columns(
 /// Values that are tried for the constant of each single candidate; one where it has none.
 ///
 /// Fails when a pose has no solution.
-fn grids(
-    candidates: &DerivedCandidates,
-    model: &Model,
-    all: &SegmentList<'_>,
-) -> Outcome<Vec<Vec<f64>>> {
+fn grids(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Vec<f64>>> {
     // Without constants no motion needs to be evaluated.
     let is_known = |single: &SingleCandidate| single.constants.is_empty();
     if candidates.singles.iter().all(is_known) {
@@ -276,13 +257,10 @@ fn single_columns(
     let evaluator = ModelEvaluator::with_constants(derivation, constants);
     let reduction = &derivation.reduction;
     // Each parameter of a candidate enters products with the power 1.
-    let holds =
-        |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
+    let holds = |product: usize, parameter: usize| reduction.products[product].0.contains(&(parameter, 1));
     // All other columns of the derivation are zero in this round.
     let wanted = |k: usize| {
-        let mut parameters = which
-            .iter()
-            .flat_map(|w| &candidates.singles[*w].parameters);
+        let mut parameters = which.iter().flat_map(|w| &candidates.singles[*w].parameters);
         parameters.any(|(_, parameter)| holds(reduction.retained[k], *parameter))
     };
     // Columns of all requested candidates in one pass.
@@ -324,14 +302,7 @@ pub(crate) fn unit_forces(
         candidates.kinds[single.kind].name == CONSTANT && single.spots.len() == 1
     };
     let which: Vec<usize> = (0..candidates.singles.len()).filter(is_constant).collect();
-    let made = single_columns(
-        candidates,
-        &which,
-        model,
-        all,
-        EvaluationFrequency::Known,
-        &|_, _| 1.0,
-    )?;
+    let made = single_columns(candidates, &which, model, all, EvaluationFrequency::Known, &|_, _| 1.0)?;
     // A force offset has one column.
     let of = |(k, columns): (&usize, Vec<ForceColumn>)| {
         let column = columns.into_iter().next()?;
@@ -408,10 +379,7 @@ fn candidate(
         }],
     };
     // A linear constant gives a further column instead of a search.
-    let linear = first
-        .constants
-        .iter()
-        .find(|c| c.2 == ConstantSearch::Linear);
+    let linear = first.constants.iter().find(|c| c.2 == ConstantSearch::Linear);
     if let (None, Some((symbol, _, _))) = (searched, linear) {
         // A column is affine in a linear constant, so the difference of its values at 1 and 0 is the column of
         // the product.
@@ -481,9 +449,7 @@ pub(crate) fn load_dependent_columns(
     let is_wanted = |k: &usize| only.is_none_or(|e| candidates.entries[e].singles.contains(k));
     // Only candidates that depend on the load are evaluated.
     let which: Vec<usize> = (0..candidates.singles.len())
-        .filter(|k| {
-            candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k)
-        })
+        .filter(|k| candidates.singles[*k].sort == EvaluationFrequency::LoadDependent && is_wanted(k))
         .collect();
     if which.is_empty() {
         return Ok(Vec::new());
@@ -495,11 +461,7 @@ pub(crate) fn load_dependent_columns(
         // Number of decimated samples of this recording.
         let kept = one.time().len();
         let of = |values: &Option<Vec<f64>>| match values {
-            Some(values) => interpolate(
-                &values[start..start + kept],
-                one.decimation(),
-                one.samples(),
-            ),
+            Some(values) => interpolate(&values[start..start + kept], one.decimation(), one.samples()),
             None => vec![0.0; one.samples()],
         };
         // The copy of the segment has the loads of the current fit.
@@ -509,8 +471,7 @@ pub(crate) fn load_dependent_columns(
         start += kept;
     }
     // The segments with the current loads.
-    let all: Vec<(&RecordingSegment, bool)> =
-        loaded.iter().map(|(one, check)| (one, *check)).collect();
+    let all: Vec<(&RecordingSegment, bool)> = loaded.iter().map(|(one, check)| (one, *check)).collect();
     let tried: Vec<Vec<f64>> = which.iter().map(|k| tried(*k)).collect();
     let place = |single: usize| which.iter().position(|w| *w == single);
     // `found[single][round]`.
@@ -558,10 +519,7 @@ pub(crate) fn load_dependent_columns(
                 columns.fill(ForceColumn(vec![None; model.drives().len()]));
             }
             ColumnChoice {
-                constants: symbol
-                    .map(|one| (one.to_owned(), *value))
-                    .into_iter()
-                    .collect(),
+                constants: symbol.map(|one| (one.to_owned(), *value)).into_iter().collect(),
                 columns,
             }
         };

@@ -4,8 +4,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnSource, ConstantCorrection, EffectParameter,
-    ForceColumn, ForceSensitivity, LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnSource, ConstantCorrection, EffectParameter, ForceColumn, ForceSensitivity,
+    LocatedEffect, SignConstraint,
 };
 
 use crate::model::Model;
@@ -18,11 +18,7 @@ use super::thresholds::CONSTANT_LEAST_EFFECT;
 const STEP: f64 = 1e-3;
 
 /// A candidate for the error of each length and angle; `is_held` is true for base parameters that are fixed.
-pub(crate) fn constants(
-    model: &Model,
-    all: &SegmentList<'_>,
-    is_held: &dyn Fn(usize) -> bool,
-) -> Vec<CandidateEffect> {
+pub(crate) fn constants(model: &Model, all: &SegmentList<'_>, is_held: &dyn Fn(usize) -> bool) -> Vec<CandidateEffect> {
     let derivation = &model.derivation;
     let mechanism = &derivation.mechanism;
     // Fixed base parameters were computed with the nominal lengths.
@@ -34,11 +30,7 @@ pub(crate) fn constants(
     let along = |k: usize, step: f64| {
         let mut moved = usual.clone();
         moved[k] += step;
-        regressor(
-            all,
-            &ModelEvaluator::with_constants(derivation, moved),
-            model,
-        )
+        regressor(all, &ModelEvaluator::with_constants(derivation, moved), model)
     };
     // The columns at the nominal constants are the same for all of them.
     let mut middle = None;
@@ -76,11 +68,7 @@ pub(crate) fn constants(
             // The central second difference.
             let second = 1.0 / (step * step);
             let first = sum([(first, &ahead[p]), (0.0, middle), (-first, &back[p])]);
-            let second = sum([
-                (second, &ahead[p]),
-                (-2.0 * second, middle),
-                (second, &back[p]),
-            ]);
+            let second = sum([(second, &ahead[p]), (-2.0 * second, middle), (second, &back[p])]);
             // Estimated base parameters get columns, fixed ones a force.
             for (part, change) in [(&mut slope, first), (&mut bend, second)] {
                 if is_held(p) {

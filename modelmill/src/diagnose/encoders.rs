@@ -4,13 +4,13 @@
 
 use modelmill_identify::changes::NormalEquations;
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem,
-    EffectParameter, ForceColumn, LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, DiagnosisProblem, EffectParameter, ForceColumn,
+    LocatedEffect, SignConstraint,
 };
 
 use crate::along;
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 use super::numbers::stack;
 use super::places::is_free;
@@ -25,16 +25,10 @@ const STEP: f64 = 1e-5;
 
 /// Derivatives of the forces by position, rate and acceleration of every active coordinate, for given base
 /// parameters; `None` if the forces cannot be evaluated next to the recorded motion.
-pub(crate) fn sensitivities(
-    model: &Model,
-    all: &SegmentList<'_>,
-    values: &[f64],
-) -> Vec<Option<[ForceColumn; 3]>> {
+pub(crate) fn sensitivities(model: &Model, all: &SegmentList<'_>, values: &[f64]) -> Vec<Option<[ForceColumn; 3]>> {
     // One coordinate at a time; a failure of one does not affect the others.
     let coordinates = 0..model.motions().len();
-    coordinates
-        .map(|i| sensitivity(model, all, values, i))
-        .collect()
+    coordinates.map(|i| sensitivity(model, all, values, i)).collect()
 }
 
 /// Candidates for a constant offset of each encoder; a free body has no encoder.
@@ -119,11 +113,7 @@ pub(crate) fn encoders(
         let step = problem.layout.segments.iter().map(|s| s.step);
         let step = step.fold(f64::MIN_POSITIVE, f64::max);
         // A prismatic coordinate has no turn: its error repeats along the travel.
-        let turn = if *is_angle {
-            std::f64::consts::TAU
-        } else {
-            travel
-        };
+        let turn = if *is_angle { std::f64::consts::TAU } else { travel };
         let choice = |times: u32| {
             let k = std::f64::consts::TAU * f64::from(times) / turn;
             // At the largest rate a wave must have enough samples, or the low-pass would remove it.
@@ -164,12 +154,7 @@ pub(crate) fn encoders(
         candidates.push(CandidateEffect {
             searched_constants: 1,
             source: ColumnSource::Columns(choices),
-            ..disturbance(
-                "encoder_eccentricity",
-                name.clone(),
-                &["sine", "cosine"],
-                *is_angle,
-            )
+            ..disturbance("encoder_eccentricity", name.clone(), &["sine", "cosine"], *is_angle)
         });
     }
     candidates
@@ -207,12 +192,7 @@ pub(crate) fn values(model: &Model, problem: &DiagnosisProblem, held: FixedParam
 
 /// Derivatives of the forces by a position, its rate and its acceleration, decimated; `None` if the forces
 /// cannot be evaluated next to the recorded motion.
-fn sensitivity(
-    model: &Model,
-    all: &SegmentList<'_>,
-    values: &[f64],
-    coordinate: usize,
-) -> Option<[ForceColumn; 3]> {
+fn sensitivity(model: &Model, all: &SegmentList<'_>, values: &[f64], coordinate: usize) -> Option<[ForceColumn; 3]> {
     let mut slopes = Vec::new();
     for order in 0..3 {
         // The forces with one derivative of the motion changed by a step of either sign.

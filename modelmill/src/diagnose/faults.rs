@@ -3,9 +3,7 @@
 //! an effect.
 
 use modelmill_identify::changes::NormalEquations;
-use modelmill_identify::diagnose::{
-    DiagnosisProblem, Disturbance, EstimatedQuantity, quantisation_step,
-};
+use modelmill_identify::diagnose::{DiagnosisProblem, Disturbance, EstimatedQuantity, quantisation_step};
 
 use crate::error::Outcome;
 use crate::model::Model;
@@ -13,16 +11,12 @@ use crate::recording::PreparedRecording;
 use crate::runs::{PhysicalChange, RecordingDifference, differences};
 
 use super::thresholds::{
-    CONTACT_GAP_S, CONTACT_MARGIN_S, CONTACT_SHORTEST_S, REPEATED_PLACE_FEWEST_SAMPLES,
-    REPEATED_PLACE_MOST_RESIDUAL,
+    CONTACT_GAP_S, CONTACT_MARGIN_S, CONTACT_SHORTEST_S, REPEATED_PLACE_FEWEST_SAMPLES, REPEATED_PLACE_MOST_RESIDUAL,
 };
 use crate::regressors::SegmentList;
 
 /// Differences of later recordings from the first one; none if they cannot be compared.
-pub(crate) fn run_differences(
-    model: &Model,
-    recordings: &[&PreparedRecording],
-) -> Vec<RecordingDifference> {
+pub(crate) fn run_differences(model: &Model, recordings: &[&PreparedRecording]) -> Vec<RecordingDifference> {
     // A single recording has nothing to compare.
     if recordings.len() < 2 {
         return Vec::new();
@@ -69,16 +63,12 @@ pub(crate) fn subtract_known(
         }
         // The same fault in several recordings becomes one entry.
         let is_same = |told: &&mut Disturbance| {
-            told.description.is_some()
-                && (&told.kind, &told.description) == (&one.kind, &one.description)
+            told.description.is_some() && (&told.kind, &told.description) == (&one.kind, &one.description)
         };
         match problem.disturbances.iter_mut().find(is_same) {
             // Only files that are not listed yet.
             Some(told) => {
-                let files = one
-                    .recordings
-                    .iter()
-                    .filter(|file| !told.recordings.contains(file));
+                let files = one.recordings.iter().filter(|file| !told.recordings.contains(file));
                 let new: Vec<String> = files.cloned().collect();
                 told.recordings.extend(new);
             }
@@ -98,14 +88,12 @@ fn difference(one: &RecordingDifference) -> Disturbance {
         _ => "different_runs",
     };
     // Sizes of the change with standard deviations.
-    let estimates = values
-        .into_iter()
-        .map(|(name, value, unit)| EstimatedQuantity {
-            name: name.to_owned(),
-            value: value.value,
-            standard_deviation: Some(value.deviation),
-            unit: unit.to_owned(),
-        });
+    let estimates = values.into_iter().map(|(name, value, unit)| EstimatedQuantity {
+        name: name.to_owned(),
+        value: value.value,
+        standard_deviation: Some(value.deviation),
+        unit: unit.to_owned(),
+    });
     Disturbance {
         kind: kind.to_owned(),
         at: at.into_iter().map(str::to_owned).collect(),
@@ -133,11 +121,7 @@ fn difference(one: &RecordingDifference) -> Disturbance {
 /// Forces with a quantisation step coarser than their noise. Uniform rounding then gives the noise, step / sqrt(12).
 ///
 /// Fails when a recording has no forces.
-fn add_quantisation_noise(
-    problem: &mut DiagnosisProblem,
-    model: &Model,
-    all: &SegmentList<'_>,
-) -> Outcome<()> {
+fn add_quantisation_noise(problem: &mut DiagnosisProblem, model: &Model, all: &SegmentList<'_>) -> Outcome<()> {
     for (d, drive) in model.drives().iter().enumerate() {
         // Steps are found in the recorded values, before any filter.
         let mut recorded = Vec::new();
@@ -146,8 +130,7 @@ fn add_quantisation_noise(
         }
         // A low-pass removes the steps, so that decimated forces show none.
         let is_decimated = all.iter().any(|(one, _)| one.decimation() > 1);
-        let Some(step) = quantisation_step(&recorded, problem.noise[d]).filter(|_| !is_decimated)
-        else {
+        let Some(step) = quantisation_step(&recorded, problem.noise[d]).filter(|_| !is_decimated) else {
             continue;
         };
         // Standard deviation of a uniform distribution over one step.
@@ -181,11 +164,7 @@ fn remove_contact_events(problem: &mut DiagnosisProblem, all: &SegmentList<'_>) 
         };
         for (i, time) in one.time().into_iter().enumerate() {
             inside.push(events.iter().any(|event| is_in(event, time, 0.0)));
-            about.push(
-                events
-                    .iter()
-                    .any(|event| is_in(event, time, CONTACT_MARGIN_S)),
-            );
+            about.push(events.iter().any(|event| is_in(event, time, CONTACT_MARGIN_S)));
             let at = i * one.decimation();
             positions.push(one.run.q.iter().map(|q| q[at]).collect::<Vec<f64>>());
         }
@@ -312,10 +291,6 @@ fn merge_events(all: &SegmentList<'_>) -> Vec<Disturbance> {
         events.push(event.clone());
     }
     // Events that are too short for a contact or push are dropped.
-    events.retain(|event| {
-        event
-            .interval
-            .is_some_and(|[from, to]| to - from >= CONTACT_SHORTEST_S)
-    });
+    events.retain(|event| event.interval.is_some_and(|[from, to]| to - from >= CONTACT_SHORTEST_S));
     events
 }

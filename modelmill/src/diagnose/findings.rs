@@ -16,18 +16,18 @@ use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{PreparedRecording, segments};
 use crate::runs::RecordingDifference;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::percent;
 
-use super::added::{self, CompletedModelFile};
-use super::chosen::NamedEffect;
+use super::added_effects::{self, CompletedModelFile};
 use super::faults;
 use super::laws::{self, LawHypothesis};
-use super::long;
+use super::long_recordings;
+use super::model_versions::ModelVersion;
 use super::off_nominal::{OffNominalParameter, off_nominal_parameters, reversed_sign_note};
 use super::problem::{self, DiagnosisQuery, DiagnosisSolution, FixedParameters};
+use super::requested_effects::NamedEffect;
 use super::thresholds::{DIFFERENCE_LEAST_GAIN, MOST_VALIDATION_ERROR};
-use super::versions::ModelVersion;
 use super::words::{self, ValidationMethod};
 
 /// Fails if the fitted model predicts validation data worse than a model without any force: findings of the fit
@@ -189,18 +189,16 @@ impl DiagnosisFindings {
             return None;
         }
         if words::has_suspicion(&self.diagnosis) {
-            return Some(
-                "First check the fault that the verdict starts with: the effects may only compensate it.",
-            );
+            return Some("First check the fault that the verdict starts with: the effects may only compensate it.");
         }
         let is_late = |found: &MissingEffect| {
             let is_its = |entry: &NewEffect| entry.kind == found.effect.kind;
-            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str())
-                && !self.entries.iter().any(is_its)
+            ["time_delay", "force_lag"].contains(&found.effect.kind.as_str()) && !self.entries.iter().any(is_its)
         };
-        self.missing.iter().any(is_late).then_some(
-            "Correct the delayed force signal where it is recorded: a model file has no entry for it.",
-        )
+        self.missing
+            .iter()
+            .any(is_late)
+            .then_some("Correct the delayed force signal where it is recorded: a model file has no entry for it.")
     }
 }
 
@@ -221,16 +219,14 @@ impl Model {
             all.iter().map(|one| one.for_diagnosis(self)).collect()
         };
         let [fewer_fit, fewer_check] = [fewer(fit)?, fewer(check)?];
-        let [of_fit, of_check] =
-            [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&PreparedRecording>>());
+        let [of_fit, of_check] = [&fewer_fit, &fewer_check].map(|all| all.iter().collect::<Vec<&PreparedRecording>>());
         let data = segments(self, &of_fit, &of_check);
         let held = question.fixed;
         let recordings: Vec<&PreparedRecording> = of_fit.into_iter().chain(of_check).collect();
         // Differences between recordings are found first, since they would look like effects.
-        let between =
-            (self.host()).run_job("comparing the recordings with each other", 0, |_| {
-                faults::run_differences(self, &recordings)
-            })?;
+        let between = (self.host()).run_job("comparing the recordings with each other", 0, |_| {
+            faults::run_differences(self, &recordings)
+        })?;
         let find = |between: &[RecordingDifference]| {
             let asked = DiagnosisQuery {
                 fixed: held,
@@ -245,9 +241,7 @@ impl Model {
         if !between.is_empty() {
             // A missing effect may look like a difference between recordings.
             let without = find(&[])?;
-            if without.mean_square_residual()
-                < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual()
-            {
+            if without.mean_square_residual() < DIFFERENCE_LEAST_GAIN * answer.mean_square_residual() {
                 answer = without;
                 between.clear();
             }
@@ -263,11 +257,11 @@ impl Model {
         let notes = data.iter().flatten().flat_map(RecordingSegment::notes);
         let notes = self.caution().into_iter().chain(notes.cloned()).collect();
         // The model file with the effects, and that model identified from the same recordings.
-        let entries = added::entries(self, &answer);
+        let entries = added_effects::entries(self, &answer);
         let (edited, after) = if entries.is_empty() {
             (None, Err(Message::new()))
         } else {
-            match added::add_entries(self, &entries) {
+            match added_effects::add_entries(self, &entries) {
                 Ok(edited) => {
                     let after = version_with_effects(self, &edited, [fit, check], &data, held);
                     (Some(edited), after.map_err(|error| error.message()))
@@ -279,11 +273,7 @@ impl Model {
         // The model without effects, for comparison.
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
         let places = judged_error_locations(&before)?;
-        let left = after
-            .as_ref()
-            .ok()
-            .map(self::judged_error_locations)
-            .transpose()?;
+        let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
         let variables = variables(&before)?;
         let mut findings = DiagnosisFindings {
             diagnosis: answer.diagnosis.clone(),
@@ -314,10 +304,7 @@ impl Model {
             findings.notes.push(note);
         }
         findings.regions = regions(&findings);
-        if question.repeat_with_nominal
-            && held != FixedParameters::All
-            && !findings.off_nominal.is_empty()
-        {
+        if question.repeat_with_nominal && held != FixedParameters::All && !findings.off_nominal.is_empty() {
             findings.with_nominal = Some(nominal_diagnosis(&findings, &between)?);
         }
         Ok(findings)
@@ -372,7 +359,7 @@ fn version_with_effects(
             let mut all = Vec::new();
             for one in recordings {
                 for stretch in one.prepare_for(&model)? {
-                    all.push(long::thin_out(&model, &stretch)?);
+                    all.push(long_recordings::thin_out(&model, &stretch)?);
                 }
             }
             Ok(all)
@@ -390,10 +377,7 @@ fn version_with_effects(
 /// The diagnosis with all parameters fixed at their nominal values.
 ///
 /// Fails when it is cancelled.
-fn nominal_diagnosis(
-    findings: &DiagnosisFindings,
-    between: &[RecordingDifference],
-) -> Outcome<NominalDiagnosis> {
+fn nominal_diagnosis(findings: &DiagnosisFindings, between: &[RecordingDifference]) -> Outcome<NominalDiagnosis> {
     let version = &findings.before;
     // The diagnosis uses the same split into fitted and validation runs.
     let of = |is_check: bool| -> Vec<RecordingSegment> {
@@ -434,21 +418,15 @@ fn missing_effects(findings: &DiagnosisFindings) -> Vec<MissingEffect> {
 
 /// Effects that the recordings can neither show nor exclude, with the reason and the experiment that would decide.
 fn undecided_effects(findings: &DiagnosisFindings) -> Vec<UndecidedEffect> {
-    let of = |effect: &LocatedEffect| {
-        UndecidedEffect {
-            effect: effect.clone(),
-            reason: "along these motions its force is almost a combination of forces that the model has, so even an effect as \
+    let of = |effect: &LocatedEffect| UndecidedEffect {
+        effect: effect.clone(),
+        reason:
+            "along these motions its force is almost a combination of forces that the model has, so even an effect as \
                    large as the force of the drive can be neither shown nor excluded"
                 .to_owned(),
-            separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
-        }
+        separating_experiment: findings.deciding_experiment(&effect.kind, &effect.at.join(" and ")),
     };
-    findings
-        .diagnosis
-        .undetermined_effects
-        .iter()
-        .map(of)
-        .collect()
+    findings.diagnosis.undetermined_effects.iter().map(of).collect()
 }
 
 /// Unit of a constant of a found effect at its places.
@@ -466,10 +444,7 @@ fn unit_of_constant(findings: &DiagnosisFindings, found: &IdentifiedEffect, name
 }
 
 /// Estimates of the search.
-fn search_estimates(
-    parameters: &[EffectParameter],
-    found: &IdentifiedEffect,
-) -> Vec<EffectEstimate> {
+fn search_estimates(parameters: &[EffectParameter], found: &IdentifiedEffect) -> Vec<EffectEstimate> {
     let values = found.estimates.iter().zip(&found.standard_deviations);
     let of = |(p, (value, std)): (&EffectParameter, (&f64, &Option<f64>))| EffectEstimate {
         name: p.symbol.clone(),
@@ -492,8 +467,7 @@ fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<Effe
         std: None,
         unit: unit_of_constant(findings, found, name),
     }));
-    let is_its =
-        |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
+    let is_its = |entry: &&NewEffect| entry.kind == found.effect.kind && entry.at == found.effect.at;
     if let Some(entry) = findings.entries.iter().find(is_its) {
         for estimate in &mut all {
             // A value that was fixed at zero, since it would have the wrong sign, stays zero.
@@ -505,10 +479,7 @@ fn estimates(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Vec<Effe
                 estimate.std = p.std;
             } else if let Some((_, constant)) = estimate.name.clone().split_once('*') {
                 // A product of a parameter and a constant is reported as the constant.
-                let known = entry
-                    .constants
-                    .iter()
-                    .find(|(symbol, _)| symbol == constant);
+                let known = entry.constants.iter().find(|(symbol, _)| symbol == constant);
                 if let Some((_, value)) = known {
                     estimate.value = *value;
                     constant.clone_into(&mut estimate.name);
@@ -531,13 +502,9 @@ fn identified_parameter<'a>(
     let mechanism = &derivation.mechanism;
     let place = findings.entries.iter().position(|one| one == entry)?;
     // Added effects are the last ones of the edited model.
-    let first = mechanism
-        .effects
-        .len()
-        .checked_sub(findings.entries.len())?;
+    let first = mechanism.effects.len().checked_sub(findings.entries.len())?;
     let effect = mechanism.effects.get(first + place)?;
-    let term = (effect.kind == entry.kind)
-        .then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
+    let term = (effect.kind == entry.kind).then(|| effect.terms.iter().find(|term| term.symbol == symbol))??;
     let reduction = &derivation.reduction;
     // A parameter is determined by itself if its product is retained alone.
     let k = reduction
@@ -561,16 +528,12 @@ fn separating_experiment(findings: &DiagnosisFindings, found: &IdentifiedEffect)
 
 /// The request for a motion that distinguishes an effect from its alternatives; `None` for a delay, which adds
 /// no force that a motion could make larger.
-fn separation(
-    findings: &DiagnosisFindings,
-    found: &IdentifiedEffect,
-) -> Option<SeparationProposal> {
+fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<SeparationProposal> {
     let is_force = |effect: &&LocatedEffect| {
         let kinds = findings.answer.candidates.kinds.iter();
         let mut kind = kinds.filter(|kind| kind.name == effect.kind);
         // A kind that is in no library has no columns along another motion.
-        kind.next()
-            .is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
+        kind.next().is_some_and(|kind| kind.mechanics != Some(Mechanics::Delay))
     };
     // Alternatives without columns along other motions cannot be separated by planning.
     let rivals = found.indistinguishable_from.iter().filter(is_force);
@@ -609,10 +572,7 @@ fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
         return findings.places.regions.clone();
     }
     let channels = &findings.answer.problem.layout.channels;
-    let left = findings
-        .residual_locations
-        .as_ref()
-        .unwrap_or(&findings.places);
+    let left = findings.residual_locations.as_ref().unwrap_or(&findings.places);
     let mut regions = Vec::new();
     // Each unexplained drive has at least one region.
     for d in &diagnosis.unexplained {
@@ -651,20 +611,12 @@ fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
 /// Regions of the error of a model, on the recordings on which errors are judged.
 fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
     let judged = version.validation_runs();
-    let (first, last) = (
-        judged.first().copied().unwrap_or(0),
-        judged.last().map_or(0, |k| k + 1),
-    );
+    let (first, last) = (judged.first().copied().unwrap_or(0), judged.last().map_or(0, |k| k + 1));
     // Validation runs are contiguous, since fitted recordings come first.
     let runs = &version.runs[first..last];
     let measured: Vec<_> = runs.iter().map(|run| run.measured.clone()).collect();
     let forces: Vec<_> = runs.iter().map(|run| run.forces.clone()).collect();
-    compare::error_locations(
-        &version.model,
-        &version.data[first..last],
-        &measured,
-        &forces,
-    )
+    compare::error_locations(&version.model, &version.data[first..last], &measured, &forces)
 }
 
 /// Variables along the recordings that are judged, one after the other.

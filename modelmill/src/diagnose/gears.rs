@@ -3,8 +3,8 @@
 //! error of the encoder. Inertia of the motor and impacts between flanks are neglected.
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
-    LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
 };
 use modelmill_spec::DriveKind;
 

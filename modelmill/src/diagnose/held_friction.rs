@@ -2,8 +2,8 @@
 //! differs from day to day; such a change is a disturbance, not a missing effect.
 
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
-    LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
 };
 use modelmill_spec::{EffectPlace, EffectTerm};
 
@@ -16,16 +16,11 @@ const KINDS: [&str; 2] = ["coulomb_friction", "viscous_friction"];
 /// all base parameters.
 pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffect> {
     let effects = &model.derivation.mechanism.effects;
-    let own = effects
-        .iter()
-        .filter(|effect| KINDS.contains(&effect.kind.as_str()));
+    let own = effects.iter().filter(|effect| KINDS.contains(&effect.kind.as_str()));
     // Dry and viscous friction at the same drives change together.
     let mut of_places: Vec<(&[EffectPlace], Vec<&EffectTerm>)> = Vec::new();
     for effect in own {
-        match of_places
-            .iter_mut()
-            .find(|(at, _)| *at == &effect.places[..])
-        {
+        match of_places.iter_mut().find(|(at, _)| *at == &effect.places[..]) {
             Some((_, terms)) => terms.extend(&effect.terms),
             None => of_places.push((&effect.places, effect.terms.iter().collect())),
         }
@@ -36,12 +31,7 @@ pub(crate) fn changes(model: &Model, base: &[ForceColumn]) -> Vec<CandidateEffec
 }
 
 /// The candidate for one set of drives; `None` if a place is no drive or a term is no base parameter by itself.
-fn change(
-    model: &Model,
-    base: &[ForceColumn],
-    at: &[EffectPlace],
-    terms: &[&EffectTerm],
-) -> Option<CandidateEffect> {
+fn change(model: &Model, base: &[ForceColumn], at: &[EffectPlace], terms: &[&EffectTerm]) -> Option<CandidateEffect> {
     let drive = |place: &EffectPlace| match place {
         EffectPlace::Drive(d) => Some(d.0),
         _ => None,

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    ForceColumn, LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable,
-    LocatedEffect, ModelDiagnosis, SiteLaw as Proposed,
+    ForceColumn, LawFactor, LawProduct, LawProposal, LawShape, LawSite, LawTerm, LawVariable, LocatedEffect,
+    ModelDiagnosis, SiteLaw as Proposed,
 };
 use modelmill_spec::edit::{NewEffect, NewParameter};
 use modelmill_spec::{ActsOn, DriveKind, EffectPlace, PlaceLoad};
@@ -15,9 +15,9 @@ use crate::along;
 use crate::error::Outcome;
 use crate::model::Model;
 use crate::regressors::SegmentList;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
-use super::added::round_significant;
+use super::added_effects::round_significant;
 use super::candidates::DerivedCandidates;
 use super::columns::unit_forces;
 use super::findings::EffectEstimate;
@@ -26,11 +26,7 @@ use super::places::{CandidatePlace, candidate_places};
 /// Places on which laws may act, along all recordings: drives, and joints without a drive of their own.
 ///
 /// Fails when a pose has no solution.
-pub(crate) fn sites(
-    candidates: &DerivedCandidates,
-    model: &Model,
-    all: &SegmentList<'_>,
-) -> Outcome<Vec<LawSite>> {
+pub(crate) fn sites(candidates: &DerivedCandidates, model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<LawSite>> {
     // The file's mechanism, since places have its names.
     let mechanism = &model.loaded.mechanism;
     let forces = unit_forces(candidates, model, all)?;
@@ -84,11 +80,7 @@ fn drive_column(model: &Model, all: &SegmentList<'_>, drive: usize) -> ForceColu
 /// Position, rate and acceleration of places along a recording, of the samples that are kept.
 ///
 /// Fails when a pose has no solution.
-fn motions(
-    model: &Model,
-    one: &RecordingSegment,
-    places: &[CandidatePlace],
-) -> Outcome<Vec<[Vec<f64>; 3]>> {
+fn motions(model: &Model, one: &RecordingSegment, places: &[CandidatePlace]) -> Outcome<Vec<[Vec<f64>; 3]>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let mechanism = &model.derivation.mechanism;
     let (active, passive) = model.derivation.coordinates();
@@ -196,9 +188,7 @@ pub(crate) fn hypotheses(model: &Model, diagnosis: &ModelDiagnosis) -> Vec<LawHy
     // Alternatives are named in the same way.
     let one = |proposal: &LawProposal| LawHypothesis {
         law: law(model, sites, &proposal.law),
-        near_ties: (proposal.near_ties.iter())
-            .map(|tie| law(model, sites, tie))
-            .collect(),
+        near_ties: (proposal.near_ties.iter()).map(|tie| law(model, sites, tie)).collect(),
     };
     diagnosis.laws.iter().map(one).collect()
 }
@@ -239,9 +229,7 @@ fn law(model: &Model, sites: &[LawSite], law: &Proposed) -> ProposedLaw {
 /// The name of a place's variable, as errors and recordings have it.
 fn variable_name(model: &Model, site: &LawSite, variable: LawVariable) -> String {
     // A drive on a joint uses the name of the coordinate, a linear drive its own.
-    let drive = site
-        .channel
-        .map(|d| &model.derivation.mechanism.drives[d].kind);
+    let drive = site.channel.map(|d| &model.derivation.mechanism.drives[d].kind);
     // Other places use their own name.
     let base = match drive {
         Some(DriveKind::Joint(i)) => &model.derivation.mechanism.coordinates[i.0].name,
@@ -271,11 +259,7 @@ fn variable_word(variable: LawVariable) -> &'static str {
 
 /// The table of a library for a law, and the effect that adds it to a model; `None` for a law that depends on
 /// the earlier motion.
-fn library_entry(
-    sites: &[LawSite],
-    law: &Proposed,
-    parameters: &[EffectEstimate],
-) -> Option<LawEntry> {
+fn library_entry(sites: &[LawSite], law: &Proposed, parameters: &[EffectEstimate]) -> Option<LawEntry> {
     let mut products = law.terms.iter().map(|term| &term.product);
     // A law that depends on the earlier motion has no formula over the state.
     if products.any(LawProduct::has_memory) {
@@ -291,11 +275,7 @@ fn library_entry(
     let expression = formula.text(law, &|variable, _| variable_word(variable).to_owned());
     // The kind is named after its place, so that several laws can be in one library.
     let kind = format!("law_of_{}", site.name);
-    let on = if site.channel.is_some() {
-        "drive"
-    } else {
-        "coordinate"
-    };
+    let on = if site.channel.is_some() { "drive" } else { "coordinate" };
     // Places on angles have torques.
     let carries = if site.is_angle { "torque" } else { "force" };
     let mut text = format!("[[effect_kind]]\nname = \"{kind}\"\non = \"{on}\"\n");
@@ -363,11 +343,7 @@ impl LawFormula {
         // A single term needs no number.
         let several = law.terms.len() > 1;
         let of_term = |(k, term): (usize, &LawTerm)| {
-            let number = if several {
-                (k + 1).to_string()
-            } else {
-                String::new()
-            };
+            let number = if several { (k + 1).to_string() } else { String::new() };
             let symbols: &[&str] = match term.values.len() {
                 1 => &["k"],
                 _ => &["ks", "kc"],
@@ -384,21 +360,14 @@ impl LawFormula {
 
     /// The formula of a law; `name` gives the name of each variable. Constants are collected on the way if they
     /// have symbols.
-    fn text(
-        &mut self,
-        law: &Proposed,
-        name: &dyn Fn(LawVariable, Option<usize>) -> String,
-    ) -> String {
+    fn text(&mut self, law: &Proposed, name: &dyn Fn(LawVariable, Option<usize>) -> String) -> String {
         let mut symbols = self.parameters.clone().into_iter();
         let mut terms = Vec::new();
         for term in &law.terms {
             let factors: Vec<Vec<String>> = (term.product.factors.iter())
                 .map(|factor| {
                     // Variables of the second place have its name.
-                    let is_other = matches!(
-                        factor.variable,
-                        LawVariable::OtherPosition | LawVariable::OtherRate
-                    );
+                    let is_other = matches!(factor.variable, LawVariable::OtherPosition | LawVariable::OtherRate);
                     let other = term.product.other.filter(|_| is_other);
                     self.factor(*factor, &name(factor.variable, other))
                 })
@@ -408,9 +377,7 @@ impl LawFormula {
             let mut product = Vec::new();
             if let Some(wave) = wave {
                 let parts = wave.iter().zip(symbols.by_ref());
-                let parts: Vec<String> = parts
-                    .map(|(text, symbol)| format!("{symbol}*{text}"))
-                    .collect();
+                let parts: Vec<String> = parts.map(|(text, symbol)| format!("{symbol}*{text}")).collect();
                 // A sum needs parentheses only next to other factors or terms.
                 let is_alone = factors.len() == 1 && law.terms.len() == 1;
                 let sum = parts.join(" + ");
@@ -431,8 +398,7 @@ impl LawFormula {
         if !self.with_symbols {
             return round_significant(value).to_string();
         }
-        let of_name =
-            |one: &&(String, f64, LawFactor)| one.0.trim_end_matches(char::is_numeric) == symbol;
+        let of_name = |one: &&(String, f64, LawFactor)| one.0.trim_end_matches(char::is_numeric) == symbol;
         // Several constants of one name are numbered from the second on.
         let symbol = match self.constants.iter().filter(of_name).count() {
             0 => symbol.to_owned(),
@@ -446,11 +412,7 @@ impl LawFormula {
     fn factor(&mut self, factor: LawFactor, z: &str) -> Vec<String> {
         let text = match factor.shape {
             // Powers of half integers need a scale, so that the unit is independent of the power.
-            LawShape::Power {
-                halves,
-                is_odd,
-                scale,
-            } => {
+            LawShape::Power { halves, is_odd, scale } => {
                 if halves % 2 == 0 {
                     integer_power(z, halves / 2, is_odd)
                 } else {
@@ -461,11 +423,7 @@ impl LawFormula {
                         1 => format!("{share}*"),
                         n => format!("({share})^{n}*"),
                     };
-                    let sign = if is_odd {
-                        format!("sign({z})*")
-                    } else {
-                        String::new()
-                    };
+                    let sign = if is_odd { format!("sign({z})*") } else { String::new() };
                     format!("{sign}{whole}sqrt({share})")
                 }
             }
@@ -491,16 +449,11 @@ impl LawFormula {
             // Both phases, since the phase is estimated linearly.
             LawShape::Wave { pitch } => {
                 let pitch = self.constant("pitch", pitch, factor);
-                return ["sin", "cos"]
-                    .map(|f| format!("{f}(2*pi*{z}/{pitch})"))
-                    .to_vec();
+                return ["sin", "cos"].map(|f| format!("{f}(2*pi*{z}/{pitch})")).to_vec();
             }
             // A smooth bump at one position.
             LawShape::Bump { centre, width } => {
-                format!(
-                    "exp(-({})^2)",
-                    self.scaled_distance(z, centre, width, factor)
-                )
+                format!("exp(-({})^2)", self.scaled_distance(z, centre, width, factor))
             }
             LawShape::Detent { centre, width } => {
                 let near = self.scaled_distance(z, centre, width, factor);
@@ -604,10 +557,7 @@ mod tests {
         use LawVariable::{Load, OtherPosition, Position, Rate};
         let wave = LawShape::Wave { pitch: 0.02 };
         assert_eq!(
-            formula(
-                &[(OtherPosition, LawShape::LINEAR), (Rate, LawShape::LINEAR)],
-                false
-            ),
+            formula(&[(OtherPosition, LawShape::LINEAR), (Rate, LawShape::LINEAR)], false),
             "k*other_coordinate*rate"
         );
         assert_eq!(

@@ -4,14 +4,14 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn,
-    LocatedEffect, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnChoice, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
 };
 
 use crate::along;
 use crate::error::Outcome;
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 use super::numbers::stack;
 use crate::regressors::SegmentList;
@@ -24,10 +24,7 @@ const LENGTHS: [f64; 12] = [
 /// Dahl friction of every drive.
 ///
 /// Fails when a pose has no solution.
-pub(crate) fn dahl_candidates(
-    model: &Model,
-    all: &SegmentList<'_>,
-) -> Outcome<Vec<CandidateEffect>> {
+pub(crate) fn dahl_candidates(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<CandidateEffect>> {
     let evaluator = ModelEvaluator::new(&model.derivation);
     let drives = model.drives();
     let mut candidates = Vec::new();
@@ -54,9 +51,7 @@ pub(crate) fn dahl_candidates(
         // The states of all distances are computed together, to evaluate the positions once.
         let of_lengths = stack(all, |one| {
             let position = &positions(one)?[d];
-            Ok(lengths
-                .map(|length| bristle_states(position, length))
-                .to_vec())
+            Ok(lengths.map(|length| bristle_states(position, length)).to_vec())
         })?;
         // The search tries one distance after the other.
         let choice = |(length, states): (f64, Vec<f64>)| {

@@ -9,7 +9,7 @@ use crate::along::filter_and_decimate;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::regressors::SegmentList;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Names of the channels, lengths of the segments, and samples that are left out.
 pub(crate) fn layout(model: &Model, all: &SegmentList<'_>) -> SampleLayout {
@@ -69,11 +69,7 @@ pub(crate) fn variables(model: &Model, all: &SegmentList<'_>) -> Vec<(String, Ve
             let of = |one: &RecordingSegment| -> Vec<f64> {
                 let run = &one.run;
                 let values = [&run.q, &run.qd, &run.qdd][order];
-                values[i]
-                    .iter()
-                    .copied()
-                    .step_by(one.decimation())
-                    .collect()
+                values[i].iter().copied().step_by(one.decimation()).collect()
             };
             let values = all.iter().flat_map(|(one, _)| of(one)).collect();
             variables.push((format!("{name}{suffix}"), values));
@@ -111,16 +107,12 @@ impl PlaceMotions {
             stack_states(all, model, |states| evaluator.passive_motion(states))?
         };
         let motion = |order: usize, i: usize| -> Vec<f64> {
-            let one = |(data, _): &(&RecordingSegment, bool)| {
-                [&data.run.q, &data.run.qd][order][i].clone()
-            };
+            let one = |(data, _): &(&RecordingSegment, bool)| [&data.run.q, &data.run.qd][order][i].clone();
             all.iter().flat_map(one).collect()
         };
         Ok(Self {
             drives,
-            active_motion: (0..active.len())
-                .map(|i| [motion(0, i), motion(1, i)])
-                .collect(),
+            active_motion: (0..active.len()).map(|i| [motion(0, i), motion(1, i)]).collect(),
             active,
             passive,
             passive_motion,
@@ -135,12 +127,8 @@ impl PlaceMotions {
             EffectPlace::Drive(d) => Some((&self.drives[n + d.0], &self.drives[d.0])),
             EffectPlace::Coordinate(i) => {
                 let at = |list: &[usize]| list.iter().position(|k| *k == i.0);
-                let passive = at(&self.passive).map(|k| {
-                    (
-                        &self.passive_motion[self.passive.len() + k],
-                        &self.passive_motion[k],
-                    )
-                });
+                let passive =
+                    at(&self.passive).map(|k| (&self.passive_motion[self.passive.len() + k], &self.passive_motion[k]));
                 let active = at(&self.active).map(|k| &self.active_motion[k]);
                 active.map(|[q, qd]| (qd, q)).or(passive)
             }
@@ -163,9 +151,7 @@ impl PlaceMotions {
 fn stack_states(
     all: &SegmentList<'_>,
     model: &Model,
-    mut evaluate: impl FnMut(
-        &modelmill_codegen::MotionStates<'_>,
-    ) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
+    mut evaluate: impl FnMut(&modelmill_codegen::MotionStates<'_>) -> Result<Vec<Vec<f64>>, modelmill_codegen::PoseFault>,
 ) -> Outcome<Vec<Vec<f64>>> {
     let mut stacked: Vec<Vec<f64>> = Vec::new();
     // The first block determines the number of columns.

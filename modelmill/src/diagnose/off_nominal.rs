@@ -7,8 +7,8 @@ use modelmill_identify::{FitParameter, ParameterStatus, RecordingNote};
 use modelmill_runtime::Random;
 use modelmill_spec::Sign;
 
+use super::model_versions::ModelVersion;
 use super::thresholds::{BODY_PARAMETER_FACTOR, OFF_NOMINAL_PART, OFF_NOMINAL_SIGMAS, SIGN_TRIALS};
-use super::versions::ModelVersion;
 
 /// A base parameter whose estimate differs from its nominal value.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,17 +49,13 @@ pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalPa
 
 /// A warning about base parameters whose sign no bodies near those of the file can have. Then not the bodies
 /// are wrong, but a direction: of gravity, a length, a drive or a column.
-pub(super) fn reversed_sign_note(
-    version: &ModelVersion,
-    off: &[OffNominalParameter],
-) -> Option<RecordingNote> {
+pub(super) fn reversed_sign_note(version: &ModelVersion, off: &[OffNominalParameter]) -> Option<RecordingNote> {
     let model = &version.model;
     // A sign counts only if the estimate is clear and about as large as the nominal value.
     let has_turned = |off: &&OffNominalParameter| {
         let p = &off.parameter;
         let is_other = p.value * off.nominal < 0.0
-            && p.std
-                .is_some_and(|std| p.value.abs() > OFF_NOMINAL_SIGMAS * std)
+            && p.std.is_some_and(|std| p.value.abs() > OFF_NOMINAL_SIGMAS * std)
             && BODY_PARAMETER_FACTOR * p.value.abs() > off.nominal.abs();
         let k = model.base.iter().position(|one| one.name == p.name);
         is_other && k.is_some_and(|k| has_one_sign(version, k))
@@ -95,8 +91,7 @@ fn has_one_sign(version: &ModelVersion, k: usize) -> bool {
     let nominal = version.model.nominal[k];
     // A fixed seed: the same recording always gives the same warning.
     let mut random = Random::new(1);
-    let may_turn =
-        |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";
+    let may_turn = |i: usize| version.model.sign_of(i) == Sign::Any && mechanism.parameters[i].unit != "m";
     // A value that is zero in the file may be as large as the largest one of its unit.
     let size = |i: usize| {
         let own = &mechanism.parameters[i];

@@ -4,8 +4,8 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    AttachedBody, CandidateEffect, CandidateNature, ColumnSource, EffectParameter, ForceColumn,
-    LocatedEffect, SignConstraint,
+    AttachedBody, CandidateEffect, CandidateNature, ColumnSource, EffectParameter, ForceColumn, LocatedEffect,
+    SignConstraint,
 };
 use modelmill_spec::{Kinematics, Mechanism};
 
@@ -45,10 +45,7 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
         let of = |k: &Option<usize>| -> ForceColumn {
             let column = k.map(|k| &columns[k]);
             let column = column.filter(|column| size(column) > PAYLOAD_LEAST_EFFECT * largest);
-            column.map_or_else(
-                || ForceColumn(vec![None; model.drives().len()]),
-                Clone::clone,
-            )
+            column.map_or_else(|| ForceColumn(vec![None; model.drives().len()]), Clone::clone)
         };
         let ten: [ForceColumn; TEN] = which.each_ref().map(of);
         let has_effect = |k: &usize| match *k {
@@ -64,10 +61,7 @@ pub(crate) fn payloads(model: &Model, all: &SegmentList<'_>) -> Outcome<Vec<Cand
             continue;
         }
         // A point mass has four parameters, a general payload seven.
-        for (most, refines) in [
-            (POINT_MASS_PARAMETERS, "point_mass"),
-            (PARAMETERS.len(), "payload"),
-        ] {
+        for (most, refines) in [(POINT_MASS_PARAMETERS, "point_mass"), (PARAMETERS.len(), "payload")] {
             // Parameters without effect are not estimated.
             let free: Vec<usize> = (0..most).filter(has_effect).collect();
             let parameter = |k: &usize| {
@@ -116,8 +110,6 @@ pub(crate) fn reach(mechanism: &Mechanism) -> f64 {
         let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
         squares.sum::<f64>().sqrt()
     };
-    let pairs = origins
-        .iter()
-        .flat_map(|a| origins.iter().map(move |b| (a, b)));
+    let pairs = origins.iter().flat_map(|a| origins.iter().map(move |b| (a, b)));
     pairs.map(|(a, b)| distance(a, b)).fold(0.0, f64::max)
 }

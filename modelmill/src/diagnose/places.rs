@@ -1,8 +1,7 @@
 //! Places at which effects of a kind may act, alone, in pairs, and alike at several.
 
 use modelmill_spec::{
-    ActsOn, DriveIdx, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism, PartIdx, PlaceLoad,
-    PointIdx,
+    ActsOn, DriveIdx, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism, PartIdx, PlaceLoad, PointIdx,
 };
 
 use crate::recording::free::free_bodies;
@@ -33,12 +32,7 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
     let mut spots = Vec::new();
     let mut driven = Vec::new();
     // Drives come first, since most effects act on them.
-    for (d, drive) in mechanism
-        .drives
-        .iter()
-        .enumerate()
-        .filter(|(_, drive)| drive.is_driven)
-    {
+    for (d, drive) in mechanism.drives.iter().enumerate().filter(|(_, drive)| drive.is_driven) {
         if let DriveKind::Joint(i) = drive.kind {
             driven.push(i.0);
         }
@@ -63,18 +57,8 @@ pub(crate) fn candidate_places(mechanism: &Mechanism) -> Vec<CandidatePlace> {
         let place = EffectPlace::Part(PartIdx(i));
         spots.push(spot(&part.name, PlaceLoad::Elsewhere, ActsOn::Part, place));
     }
-    spots.push(spot(
-        "base",
-        PlaceLoad::Elsewhere,
-        ActsOn::Base,
-        EffectPlace::Base,
-    ));
-    spots.push(spot(
-        "force",
-        PlaceLoad::Elsewhere,
-        ActsOn::Force,
-        EffectPlace::Force,
-    ));
+    spots.push(spot("base", PlaceLoad::Elsewhere, ActsOn::Base, EffectPlace::Base));
+    spots.push(spot("force", PlaceLoad::Elsewhere, ActsOn::Force, EffectPlace::Force));
     spots
 }
 
@@ -88,11 +72,7 @@ pub(crate) fn is_free(mechanism: &Mechanism, coordinate: usize) -> bool {
 }
 
 /// Whether a kind may act at a place and can have an effect there.
-pub(crate) fn is_applicable(
-    mechanism: &Mechanism,
-    kind: &EffectKind,
-    spot: &CandidatePlace,
-) -> bool {
+pub(crate) fn is_applicable(mechanism: &Mechanism, kind: &EffectKind, spot: &CandidatePlace) -> bool {
     let has_unit = |units: &[(PlaceLoad, String)]| units.iter().any(|(c, _)| *c == spot.carries);
     let has_units = kind.parameters.iter().all(|p| has_unit(&p.units));
     if !kind.on.contains(&spot.sort) {
@@ -125,9 +105,7 @@ pub(crate) fn is_applicable(
 pub(crate) fn is_wave(kind: &EffectKind) -> bool {
     use modelmill_spec::{ConstantSearch, Scale};
     kind.constants.iter().any(|c| match c.search {
-        Some(ConstantSearch::Range { from, of, .. }) => {
-            of == Scale::Travel && from < WAVE_SHORTEST_TRAVEL
-        }
+        Some(ConstantSearch::Range { from, of, .. }) => of == Scale::Travel && from < WAVE_SHORTEST_TRAVEL,
         _ => false,
     })
 }
@@ -146,8 +124,7 @@ pub(crate) fn place_sets<'a>(
     // A kind with a second place: each place with each other one of the right motion.
     if let Some(motion) = kind.other {
         let moves = |spot: &&&CandidatePlace| {
-            matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate)
-                && spot.carries == motion.place_load()
+            matches!(spot.sort, ActsOn::Drive | ActsOn::Coordinate) && spot.carries == motion.place_load()
         };
         let others: Vec<&CandidatePlace> = all.iter().filter(|spot| moves(&spot)).collect();
         let with_others = |one: &&'a CandidatePlace| {
@@ -161,11 +138,7 @@ pub(crate) fn place_sets<'a>(
     }
     // Mechanics between two points, such as springs.
     if let Some(joined) = kind.mechanics.and_then(|one| one.pairs(mechanism)) {
-        let at = |point: PointIdx| {
-            spots
-                .iter()
-                .find(|spot| spot.place == EffectPlace::Point(point))
-        };
+        let at = |point: PointIdx| spots.iter().find(|spot| spot.place == EffectPlace::Point(point));
         let pair = |[one, other]: [PointIdx; 2]| Some(vec![*at(one)?, *at(other)?]);
         let pairs: Vec<Vec<&CandidatePlace>> = joined.into_iter().filter_map(pair).collect();
         let sets = (0..pairs.len()).map(|k| vec![k]).collect();

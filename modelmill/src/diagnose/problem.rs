@@ -3,9 +3,9 @@
 
 use modelmill_codegen::ModelEvaluator;
 use modelmill_identify::diagnose::{
-    CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance,
-    FORCE_ROUNDING, ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose,
-    drift_candidates, reading_fault_candidates, white_noise,
+    CandidateOutcome, ColumnChoice, ColumnProvider, ColumnSource, DiagnosisProblem, Disturbance, FORCE_ROUNDING,
+    ForceColumn, LawSite, LoadDependentQuery, ModelDiagnosis, diagnose, drift_candidates, reading_fault_candidates,
+    white_noise,
 };
 
 use crate::along::drive_rates;
@@ -13,7 +13,7 @@ use crate::error::{Error, Outcome};
 use crate::identify::regression::zero_force_message;
 use crate::model::Model;
 use crate::runs::RecordingDifference;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
 use super::candidates::{DerivedCandidates, candidates};
@@ -91,12 +91,11 @@ pub(crate) fn find_missing_effects(
     let all: Vec<(&RecordingSegment, bool)> = (fit.iter().map(|one| (one, false)))
         .chain(check.iter().map(|one| (one, true)))
         .collect();
-    let (mut problem, made) =
-        model
-            .host()
-            .run_job("computing the forces of all candidates", 0, |_| {
-                problem(&candidates, model, &all)
-            })??;
+    let (mut problem, made) = model
+        .host()
+        .run_job("computing the forces of all candidates", 0, |_| {
+            problem(&candidates, model, &all)
+        })??;
     let mut origins = made.origins;
     // Stage 2: fixed parameters and known faults are subtracted from the forces.
     let other_friction = match held {
@@ -137,9 +136,7 @@ pub(crate) fn find_missing_effects(
     };
     let mut diagnosis = model
         .host()
-        .run_job("searching for missing effects", 0, |_| {
-            diagnose(&mut problem, &supply)
-        })?;
+        .run_job("searching for missing effects", 0, |_| diagnose(&mut problem, &supply))?;
     // Stage 5: texts, and candidates that could not be evaluated.
     for one in &mut diagnosis.disturbances {
         describe_disturbance(one, model);
@@ -204,11 +201,7 @@ impl ColumnProvider for ColumnSupply<'_> {
         sites(self.candidates, self.model, self.all).unwrap_or_default()
     }
 
-    fn load_dependent_columns(
-        &self,
-        load: &ForceColumn,
-        which: LoadDependentQuery,
-    ) -> Vec<(usize, ColumnChoice)> {
+    fn load_dependent_columns(&self, load: &ForceColumn, which: LoadDependentQuery) -> Vec<(usize, ColumnChoice)> {
         // Either all candidates or one of them, with a given value of its constant.
         let only = match which {
             LoadDependentQuery::All => None,
@@ -221,18 +214,14 @@ impl ColumnProvider for ColumnSupply<'_> {
         };
         let tried = |single: usize| match which {
             LoadDependentQuery::One(_, Some(value)) => vec![value],
-            LoadDependentQuery::All | LoadDependentQuery::One(_, None) => {
-                grid_middle(&self.grids[single])
-            }
+            LoadDependentQuery::All | LoadDependentQuery::One(_, None) => grid_middle(&self.grids[single]),
         };
         // Poses without answer were reported when the recordings were evaluated for the first time.
-        let made =
-            load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
+        let made = load_dependent_columns(self.candidates, self.model, self.all, load, only, &tried);
         let made = made.unwrap_or_default();
         // From entries back to candidates of the problem.
         let place = |entry: usize| {
-            let is_its =
-                |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
+            let is_its = |origin: &CandidateOrigin| origin.as_ref().is_some_and(|(k, _)| *k == entry);
             self.origins.iter().position(is_its)
         };
         made.into_iter()
@@ -258,9 +247,7 @@ fn problem(
     // Forces that are all zero come from a recording without them.
     if measured.iter().flatten().all(|force| *force == 0.0) {
         let file = all.first().map(|(one, _)| one.run.file.as_str());
-        return Err(Error::input(zero_force_message(
-            file.unwrap_or("the recording"),
-        )));
+        return Err(Error::input(zero_force_message(file.unwrap_or("the recording"))));
     }
     for (one, _) in all {
         let samples = one.time().len();
@@ -276,12 +263,7 @@ fn problem(
     // The noise and the layout come from the recordings, the columns from the model.
     let mut made = columns::candidate_columns(candidates, model, all)?;
     // A row without drive whose force is zero has no noise and no friction.
-    let undriven = model
-        .derivation
-        .mechanism
-        .drives
-        .iter()
-        .map(|drive| !drive.is_driven);
+    let undriven = model.derivation.mechanism.drives.iter().map(|drive| !drive.is_driven);
     let idle = undriven
         .zip(&measured)
         .map(|(undriven, force)| undriven && force.iter().all(|f| *f == 0.0));

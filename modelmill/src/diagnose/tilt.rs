@@ -18,11 +18,7 @@ pub(crate) const TILTS: [&str; 3] = ["tx", "ty", "tz"];
 /// directions, are exact.
 ///
 /// Fails when a pose has no solution.
-pub(crate) fn tilt(
-    derivation: &Derivation,
-    model: &Model,
-    all: &SegmentList<'_>,
-) -> Outcome<TiltCandidate> {
+pub(crate) fn tilt(derivation: &Derivation, model: &Model, all: &SegmentList<'_>) -> Outcome<TiltCandidate> {
     let mechanism = &derivation.mechanism;
     let usual: Vec<f64> = mechanism.constants.iter().map(|c| c.value).collect();
     let gravity = model.gravity();
@@ -49,11 +45,7 @@ pub(crate) fn tilt(
                     constants[at] = angle;
                 }
             }
-            regressor(
-                all,
-                &ModelEvaluator::with_constants(derivation, constants),
-                model,
-            )
+            regressor(all, &ModelEvaluator::with_constants(derivation, constants), model)
         };
         // Half the difference of both directions is the part that changes with gravity.
         let [before, after] = [along(-1.0)?, along(1.0)?];

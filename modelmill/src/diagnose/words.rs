@@ -104,9 +104,7 @@ pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
         // Words of the search at the left, sentences at the right.
         "sign" => "its value would have the wrong sign",
-        "explains nothing that is left" if has_effects => {
-            "redundant: the effects found already explain it"
-        }
+        "explains nothing that is left" if has_effects => "redundant: the effects found already explain it",
         "explains nothing that is left" => "explains almost none of the error",
         "another explains more" => "another candidate explains more",
         "what is left is rounding" => "only noise is left to explain",
@@ -114,9 +112,7 @@ pub fn refusal(reason: &str, has_effects: bool) -> &str {
         "not supported by cross-validation" => "not confirmed by cross-validation",
         "not worth its parameters" => "the gain is too small for its number of parameters",
         "the model says it already" => "the model already has it",
-        "no finite value somewhere along the recordings" => {
-            "its formula has no finite value at some samples"
-        }
+        "no finite value somewhere along the recordings" => "its formula has no finite value at some samples",
         other => other,
     }
 }
@@ -126,11 +122,7 @@ pub fn refusal(reason: &str, has_effects: bool) -> &str {
 /// in the recordings.
 ///
 /// `channels` are the names of the drives.
-pub fn verdict(
-    diagnosis: &ModelDiagnosis,
-    channels: &[String],
-    judged: ValidationMethod,
-) -> String {
+pub fn verdict(diagnosis: &ModelDiagnosis, channels: &[String], judged: ValidationMethod) -> String {
     let ladder = &diagnosis.steps;
     // Without steps there is no verdict.
     let (Some(first), Some(last)) = (ladder.first(), ladder.last()) else {
@@ -148,10 +140,7 @@ pub fn verdict(
             judged.phrase(),
             percent(Some(last.check))
         ),
-        DiagnosisVerdict::MissingEffect => format!(
-            "The model lacks {}. With {them} {falls}. {noise}",
-            effects(&found)
-        ),
+        DiagnosisVerdict::MissingEffect => format!("The model lacks {}. With {them} {falls}. {noise}", effects(&found)),
         DiagnosisVerdict::Unexplained => {
             let of = |d: &usize| 100.0 * diagnosis.repeatable_share[*d];
             // Drives with a residual that a model could explain.
@@ -202,9 +191,7 @@ fn error_reduction_text(
     });
     // The total is used unless it hides the drive.
     let (of, before, after) = match most {
-        Some((channel, (before, after)))
-            if last.check > HARDLY_LOWER * first.check && after < before =>
-        {
+        Some((channel, (before, after))) if last.check > HARDLY_LOWER * first.check && after < before => {
             (format!(" of {channel}"), *before, *after)
         }
         _ => (String::new(), first.check, last.check),
@@ -221,9 +208,7 @@ fn error_reduction_text(
 /// without any.
 fn first_checks(diagnosis: &ModelDiagnosis) -> Option<String> {
     let suspicions = (diagnosis.disturbances.iter()).filter(|one| is_suspicion(one));
-    let says: Vec<&str> = suspicions
-        .filter_map(|one| one.description.as_deref())
-        .collect();
+    let says: Vec<&str> = suspicions.filter_map(|one| one.description.as_deref()).collect();
     (!says.is_empty()).then(|| {
         format!(
             "Check the recording and the model first: {}.",
@@ -282,17 +267,14 @@ pub fn disturbance(one: &Disturbance) -> String {
     let value = |name: &str| {
         let found = one.estimates.iter().find(|value| value.name == name);
         found.map_or_else(String::new, |q| {
-            format!("{} {}", significant(q.value, 3), q.unit)
-                .trim_end()
-                .to_owned()
+            format!("{} {}", significant(q.value, 3), q.unit).trim_end().to_owned()
         })
     };
     // All estimates with standard deviations, for kinds without a sentence of their own.
     let all: Vec<String> = (one.estimates.iter())
         .map(|q| {
             let deviation = q.standard_deviation;
-            let deviation =
-                deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+            let deviation = deviation.map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
             let said = format!("{} {}{deviation} {}", q.name, number(q.value), q.unit);
             said.trim_end().to_owned()
         })
@@ -306,10 +288,7 @@ pub fn disturbance(one: &Disturbance) -> String {
             value("noise"),
             value("corner")
         ),
-        "quantised_force" => format!(
-            "the measured force of {at} is quantised in steps of {}",
-            value("step")
-        ),
+        "quantised_force" => format!("the measured force of {at} is quantised in steps of {}", value("step")),
         "outliers" => {
             // The share of the samples has no unit.
             let share = one.estimates.iter().find(|value| value.name == "share");
@@ -321,10 +300,7 @@ pub fn disturbance(one: &Disturbance) -> String {
         }
         "periodic_in_time" => {
             // A hum may have several frequencies.
-            let frequencies = one
-                .estimates
-                .iter()
-                .filter(|value| value.name == "frequency");
+            let frequencies = one.estimates.iter().filter(|value| value.name == "frequency");
             let frequencies: Vec<String> = frequencies
                 .map(|value| format!("{} Hz", significant(value.value, 4)))
                 .collect();
@@ -336,9 +312,7 @@ pub fn disturbance(one: &Disturbance) -> String {
         }
         "offset_drift" => format!("the zero of the measured force of {at} drifts with time: {all}"),
         "friction_drift" => {
-            format!(
-                "the friction of {at} changes during a recording, as it does when a joint warms up: {all}"
-            )
+            format!("the friction of {at} changes during a recording, as it does when a joint warms up: {all}")
         }
         "encoder_eccentricity" => format!(
             "the encoder of {at} has the error of an eccentric disc, {} times per turn: {all}",
@@ -347,9 +321,9 @@ pub fn disturbance(one: &Disturbance) -> String {
         "different_runs" => {
             format!("the friction of {at} differs from the fixed values of the model: {all}")
         }
-        "encoder_zero" => format!(
-            "the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}"
-        ),
+        "encoder_zero" => {
+            format!("the encoder of {at} has a constant offset, since its zero differs from that of the model: {all}")
+        }
         "contact_event" => {
             let [from, to] = one.interval.unwrap_or_default();
             format!(
@@ -386,9 +360,7 @@ pub fn lines(text: &str, letters: usize) -> Vec<String> {
 pub(crate) fn meaning(kind: &str) -> Option<&'static str> {
     Some(match kind {
         "drive_gain" => "The measured force is 1 + gain times the true force.",
-        "force_lag" => {
-            "The measured force is the true one after a first-order low-pass with time constant tau."
-        }
+        "force_lag" => "The measured force is the true one after a first-order low-pass with time constant tau.",
         "dahl_friction" => "Dry friction that builds up over a distance after each reversal.",
         _ => return None,
     })

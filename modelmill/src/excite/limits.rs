@@ -37,9 +37,7 @@ impl TrajectoryLimit {
     /// assert!(TrajectoryLimit::parse("theta1=2.1:1.5").is_err());
     /// ```
     pub fn parse(text: &str) -> Result<Self, String> {
-        let expected = || {
-            "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned()
-        };
+        let expected = || "expected NAME=SIZE or NAME=LOW:HIGH, such as theta1_d=1.2 or theta1=1.5:2.1".to_owned();
         let (name, range) = text.split_once('=').ok_or_else(expected)?;
         // Numbers must be finite, so that a range has an end.
         let number = |text: &str| {
@@ -54,9 +52,7 @@ impl TrajectoryLimit {
             }
         };
         if ends[0] >= ends[1] {
-            return Err(
-                "this range is empty; the lower end comes first, and a size is above 0".to_owned(),
-            );
+            return Err("this range is empty; the lower end comes first, and a size is above 0".to_owned());
         }
         Ok(Self {
             name: name.trim().to_owned(),
@@ -112,11 +108,7 @@ pub fn merged_limits(model: &Model, given: &[TrajectoryLimit]) -> Outcome<Motion
 ///
 /// Fails when there is no such coordinate, when a rate of a passive coordinate is limited, or when the range of
 /// a rate excludes 0.
-fn set_coordinate_limit(
-    model: &Model,
-    limits: &mut MotionLimits,
-    limit: &TrajectoryLimit,
-) -> Outcome {
+fn set_coordinate_limit(model: &Model, limits: &mut MotionLimits, limit: &TrajectoryLimit) -> Outcome {
     let coordinates = &model.derivation.mechanism.coordinates;
     let name = limit.name.as_str();
     // The option is repeated in every message of this limit.
@@ -157,10 +149,9 @@ fn set_coordinate_limit(
     // A coordinate without limits gets an entry.
     let position = limits.coordinates.iter().position(|(c, _)| c.0 == i);
     let k = position.unwrap_or_else(|| {
-        limits.coordinates.push((
-            CoordinateIdx(i),
-            modelmill_spec::CoordinateBounds::default(),
-        ));
+        limits
+            .coordinates
+            .push((CoordinateIdx(i), modelmill_spec::CoordinateBounds::default()));
         limits.coordinates.len() - 1
     });
     let one = &mut limits.coordinates[k].1;
@@ -189,7 +180,7 @@ pub(crate) fn with_recorded_ranges(
         }
         // Range of a derivative over all recordings.
         let range = |order: usize| {
-            let runs = recordings.iter().map(|stretch| &stretch.run);
+            let runs = recordings.iter().map(|segment| &segment.run);
             let values = runs.flat_map(|run| &[&run.q, &run.qd, &run.qdd][order][k]);
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| {
                 [low.min(*x), high.max(*x)]
@@ -212,11 +203,7 @@ pub(crate) fn with_recorded_ranges(
         limits.coordinates.retain(|(c, _)| c.0 != *i);
         limits.coordinates.push((CoordinateIdx(*i), one));
         let ends = [low, high].map(|x| significant(x, 3));
-        let unit = if coordinates[*i].motion.is_angle() {
-            "rad"
-        } else {
-            "m"
-        };
+        let unit = if coordinates[*i].motion.is_angle() { "rad" } else { "m" };
         says.push(format!(
             "`{}` from {} to {} {unit}",
             coordinates[*i].name, ends[0], ends[1]

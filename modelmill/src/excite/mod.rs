@@ -10,8 +10,7 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::RecordingNote;
 use modelmill_identify::excite::{
-    ExcitationMotion, ExcitationPlant, ExcitationTrajectory, excite, max_progress_steps,
-    scaled_condition_number,
+    ExcitationMotion, ExcitationPlant, ExcitationTrajectory, excite, max_progress_steps, scaled_condition_number,
 };
 
 use crate::diagnose::NamedEffect;
@@ -96,11 +95,7 @@ impl Model {
     ///
     /// Fails when a coordinate has no limits, when no trajectory keeps them, or when no motion distinguishes the
     /// effects.
-    pub fn excite(
-        &self,
-        request: &ExcitationRequest,
-        recordings: &[&PreparedRecording],
-    ) -> Outcome<ExcitationResult> {
+    pub fn excite(&self, request: &ExcitationRequest, recordings: &[&PreparedRecording]) -> Outcome<ExcitationResult> {
         if free_bodies(&self.derivation.mechanism).next().is_some() {
             return Err(Error::input(format!(
                 "{}: motion is planned for joints, but this model has a free body; fix the body to the base and plan \
@@ -109,11 +104,8 @@ impl Model {
             )));
         }
         // Options replace limits of the model file; recordings fill in what both leave open.
-        let (all_limits, as_recorded) = limits::with_recorded_ranges(
-            self,
-            limits::merged_limits(self, &request.limits)?,
-            recordings,
-        );
+        let (all_limits, as_recorded) =
+            limits::with_recorded_ranges(self, limits::merged_limits(self, &request.limits)?, recordings);
         let coordinates = limits::active_limits(self, &all_limits)?;
         // The criterion of the options is replaced if effects are the goal.
         let mut options = request.options.clone();
@@ -149,11 +141,9 @@ impl Model {
         // The search reports progress for each trajectory.
         let found = self
             .host()
-            .run_job(
-                "searching for a trajectory",
-                max_progress_steps(&options),
-                |job| excite(searched, &coordinates, &options, &|more| job.flow(more)),
-            )?
+            .run_job("searching for a trajectory", max_progress_steps(&options), |job| {
+                excite(searched, &coordinates, &options, &|more| job.flow(more))
+            })?
             .map_err(|error| Error::input(format!("{}: {error}", self.path)))?;
         let samples = samples_per_period(request.rate, options.period);
         let motion = ExcitationMotion::sample(&found.series, samples);
@@ -236,11 +226,7 @@ fn samples_per_period(rate: f64, period: f64) -> usize {
 impl ExcitationResult {
     /// The trajectory as a recording without forces (CSV): `t`, positions, rates and accelerations, SI units.
     pub fn csv(&self) -> String {
-        let motion = [
-            ("", &self.motion.q),
-            ("_d", &self.motion.qd),
-            ("_dd", &self.motion.qdd),
-        ];
+        let motion = [("", &self.motion.q), ("_d", &self.motion.qd), ("_dd", &self.motion.qdd)];
         let named: Vec<(String, &[f64])> = motion
             .iter()
             .flat_map(|(suffix, columns)| {
@@ -301,18 +287,10 @@ fn picture(
             .replace('m', &format!("m/{seconds}"))
     };
     panel(&format!("rate, {}", per("s")), &motion.qd, &names);
-    panel(
-        &format!("acceleration, {}", per("s^2")),
-        &motion.qdd,
-        &names,
-    );
+    panel(&format!("acceleration, {}", per("s^2")), &motion.qdd, &names);
     // Forces of the nominal model show whether the drives can follow.
     if let Some(forces) = plant.forces(motion) {
-        panel(
-            "force of the nominal model, N or N m",
-            &forces,
-            &model.drives(),
-        );
+        panel("force of the nominal model, N or N m", &forces, &model.drives());
     }
     figure.finish()
 }

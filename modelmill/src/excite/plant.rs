@@ -1,9 +1,7 @@
 //! A model as the search for excitation uses it: regressor, and limits in addition to those of the active coordinates.
 
 use modelmill_codegen::{ModelEvaluator, MotionStates};
-use modelmill_identify::excite::{
-    ExcitationMotion, ExcitationPlant, LimitMargin, least_singular_value,
-};
+use modelmill_identify::excite::{ExcitationMotion, ExcitationPlant, LimitMargin, least_singular_value};
 use modelmill_spec::{Kinematics, MotionLimits, PointIdx};
 use nalgebra::DMatrix;
 
@@ -80,9 +78,7 @@ impl<'a> ModelPlant<'a> {
             limits,
             active,
             passive,
-            unknown: (0..model.base.len())
-                .filter(|k| !model.is_known(*k))
-                .collect(),
+            unknown: (0..model.base.len()).filter(|k| !model.is_known(*k)).collect(),
             passive_ranges,
             point_ranges,
             singularity: None,
@@ -112,9 +108,7 @@ impl<'a> ModelPlant<'a> {
     pub fn forces(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let still = self.zero_load(motion);
         let states = states(motion, &still);
-        self.evaluator
-            .inverse_dynamics(&states, &self.model.nominal)
-            .ok()
+        self.evaluator.inverse_dynamics(&states, &self.model.nominal).ok()
     }
 
     /// Zero forces of all drives along a motion.
@@ -132,10 +126,7 @@ impl<'a> ModelPlant<'a> {
         }
         if !self.passive.is_empty() {
             let still = self.zero_load(motion);
-            let columns = self
-                .evaluator
-                .passive_motion(&states(motion, &still))
-                .ok()?;
+            let columns = self.evaluator.passive_motion(&states(motion, &still)).ok()?;
             for (i, column) in self.passive.iter().zip(columns) {
                 all[*i] = column;
             }
@@ -221,9 +212,8 @@ impl ExcitationPlant for ModelPlant<'_> {
     fn excess(&self, motion: &ExcitationMotion) -> Option<Vec<Vec<f64>>> {
         let mut all = Vec::new();
         // The distance from the middle of the range, relative to its half; 0 at the limit.
-        let beyond = |value: f64, [low, high]: [f64; 2]| {
-            (value - 0.5 * (low + high)).abs() / (0.5 * (high - low)) - 1.0
-        };
+        let beyond =
+            |value: f64, [low, high]: [f64; 2]| (value - 0.5 * (low + high)).abs() / (0.5 * (high - low)) - 1.0;
         let needs_poses = !self.point_ranges.is_empty();
         if !self.passive_ranges.is_empty() || needs_poses {
             // Passive coordinates, in the order of their names.
@@ -250,10 +240,7 @@ impl ExcitationPlant for ModelPlant<'_> {
                 let at: Vec<f64> = coordinates.iter().map(|column| column[sample]).collect();
                 let poses = self.kinematics.poses(&at);
                 for (column, (point, axis, range)) in columns.iter_mut().zip(&self.point_ranges) {
-                    column.push(beyond(
-                        self.kinematics.point_position(&poses, *point)[*axis],
-                        *range,
-                    ));
+                    column.push(beyond(self.kinematics.point_position(&poses, *point)[*axis], *range));
                 }
             }
             all.append(&mut columns);
@@ -304,16 +291,9 @@ mod tests {
                 proven: false,
             })
         };
-        let close =
-            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found}");
+        let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found}");
         // Ranges: the middle, the edge, beyond; sampling may put the middle a little below.
-        for (excess, expected) in [
-            (-1.01, 0.0),
-            (-1.0, 0.0),
-            (-0.25, 0.75),
-            (0.0, 1.0),
-            (0.5, 1.5),
-        ] {
+        for (excess, expected) in [(-1.01, 0.0), (-1.0, 0.0), (-0.25, 0.75), (0.0, 1.0), (0.5, 1.5)] {
             close(used("theta1", excess), expected);
         }
         // Least values of four times the limit, of the limit, and of half of it: excess is one less their ratio.

@@ -21,7 +21,7 @@ use crate::diagnose::{ChosenEffect, ConstantPolicy, NamedEffect, base_columns, d
 use crate::error::{Error, Outcome};
 use crate::excite::plant::ModelPlant;
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use modelmill_identify::diagnose::FORCE_ROUNDING;
 
 /// The effects to be distinguished, derived.
@@ -81,10 +81,7 @@ impl SeparationSetup {
         beside: &[NamedEffect],
     ) -> Outcome<Self> {
         // Each effect may be named once only.
-        let all: Vec<&NamedEffect> = std::iter::once(separate)
-            .chain(from)
-            .chain(beside)
-            .collect();
+        let all: Vec<&NamedEffect> = std::iter::once(separate).chain(from).chain(beside).collect();
         for (k, one) in all.iter().enumerate() {
             if all[..k].iter().any(|known| is_same_effect(known, one)) {
                 return Err(Error::input(message!(
@@ -97,8 +94,7 @@ impl SeparationSetup {
             }
         }
         // Constants of alternatives are searched, those of other effects are fixed.
-        let choose =
-            |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
+        let choose = |named: &NamedEffect, constants: ConstantPolicy| derive_effect(model, named, constants);
         let truth = choose(separate, ConstantPolicy::Usual)?;
         // A tilt of the base has sizes for its angles, which are constants of its kind.
         let parameters = &truth.kind.parameters;
@@ -122,9 +118,8 @@ impl SeparationSetup {
         }
         sizes.retain(|(symbol, _)| is_size(symbol) || symbol.contains('*'));
         // An effect with searched constants is fitted over their ranges.
-        let is_searched = |c: &modelmill_spec::KindConstant| {
-            matches!(c.search, Some(modelmill_spec::ConstantSearch::Range { .. }))
-        };
+        let is_searched =
+            |c: &modelmill_spec::KindConstant| matches!(c.search, Some(modelmill_spec::ConstantSearch::Range { .. }));
         let free = NamedEffect {
             effect: separate.effect.clone(),
             values: Vec::new(),
@@ -187,11 +182,7 @@ impl SeparationSetup {
 
     /// Estimates from recordings what is not given: the noise, and the size of the effect by a fit together with the
     /// base.
-    pub(crate) fn estimate_from_recordings(
-        &mut self,
-        model: &Model,
-        data: &[RecordingSegment],
-    ) -> Outcome {
+    pub(crate) fn estimate_from_recordings(&mut self, model: &Model, data: &[RecordingSegment]) -> Outcome {
         // Forces of all recordings are joined drive by drive.
         let mut measured: Vec<Vec<f64>> = Vec::new();
         for one in data {
@@ -354,9 +345,7 @@ impl SeparationSetup {
             let known = self.sizes.iter().find(|(known, _)| known == symbol);
             known.map_or(0.0, |(_, value)| *value)
         };
-        let values: Vec<f64> = (candidate.parameters.iter())
-            .map(|p| value(&p.symbol))
-            .collect();
+        let values: Vec<f64> = (candidate.parameters.iter()).map(|p| value(&p.symbol)).collect();
         columns * DMatrix::from_column_slice(values.len(), 1, &values)
     }
 
@@ -364,10 +353,7 @@ impl SeparationSetup {
     pub(crate) fn wrong_signs(&self) -> Vec<&str> {
         let wrong = |symbol: &str, value: f64| {
             let parameter = self.truth.kind.parameters.iter();
-            let sign = parameter
-                .filter(|p| p.symbol == symbol)
-                .map(|p| p.sign)
-                .next();
+            let sign = parameter.filter(|p| p.symbol == symbol).map(|p| p.sign).next();
             match sign.map(crate::diagnose::sign) {
                 Some(SignConstraint::Positive) => value < 0.0,
                 Some(SignConstraint::Negative) => value > 0.0,
@@ -395,11 +381,7 @@ impl SeparationSetup {
 fn is_same_effect(one: &NamedEffect, other: &NamedEffect) -> bool {
     one.effect.kind == other.effect.kind
         && one.effect.at.len() == other.effect.at.len()
-        && one
-            .effect
-            .at
-            .iter()
-            .all(|place| other.effect.at.contains(place))
+        && one.effect.at.iter().all(|place| other.effect.at.contains(place))
 }
 
 /// Columns of the effects along segments.
@@ -444,11 +426,7 @@ pub(crate) struct SeparatingPlant<'a> {
 
 impl SeparatingPlant<'_> {
     /// The distance of the effects along a motion; `None` if a pose has no solution or the effect has no force.
-    pub(crate) fn distance_along(
-        &self,
-        motion: &ExcitationMotion,
-        which: &[usize],
-    ) -> Option<EffectDistance> {
+    pub(crate) fn distance_along(&self, motion: &ExcitationMotion, which: &[usize]) -> Option<EffectDistance> {
         let data = [recording(self.inner, motion)?];
         self.pair.distance_along(self.model, &data, which).ok()?
     }
@@ -457,9 +435,7 @@ impl SeparatingPlant<'_> {
 impl ExcitationPlant for SeparatingPlant<'_> {
     fn regressor(&self, motion: &ExcitationMotion) -> Option<DMatrix<f64>> {
         // Without unknown base parameters there is no condition number.
-        self.inner
-            .regressor(motion)
-            .filter(|matrix| matrix.ncols() > 0)
+        self.inner.regressor(motion).filter(|matrix| matrix.ncols() > 0)
     }
 
     fn limits(&self) -> Vec<String> {
@@ -471,8 +447,7 @@ impl ExcitationPlant for SeparatingPlant<'_> {
     }
 
     fn separation(&self, motion: &ExcitationMotion) -> Option<f64> {
-        self.distance_along(motion, &self.which)
-            .map(|apart| apart.force)
+        self.distance_along(motion, &self.which).map(|apart| apart.force)
     }
 }
 

@@ -15,7 +15,7 @@ use crate::diagnose::words;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::{ColumnAlignment, count, significant, table};
 
 use super::SeparationRequest;
@@ -103,10 +103,7 @@ pub(crate) fn prepare_separation(
             pair: &pair,
             which: vec![k],
         };
-        let all: Vec<EffectDistance> = motions
-            .iter()
-            .filter_map(|m| probe.distance_along(m, &[k]))
-            .collect();
+        let all: Vec<EffectDistance> = motions.iter().filter_map(|m| probe.distance_along(m, &[k])).collect();
         // An effect without force anywhere has missing nominal values, or is not in the load path.
         let name = words::effect(pair.effect());
         if all.is_empty() {
@@ -153,13 +150,7 @@ pub(crate) fn prepare_separation(
              some values of the effect are equivalent, give others (NAME=VALUE after a colon)",
             model.path,
             words::effect(pair.effect()),
-            words::effects(
-                &pair
-                    .rivals
-                    .iter()
-                    .map(|r| r.effect().clone())
-                    .collect::<Vec<_>>()
-            ),
+            words::effects(&pair.rivals.iter().map(|r| r.effect().clone()).collect::<Vec<_>>()),
         )));
     }
     Ok(SeparationTask {
@@ -172,11 +163,7 @@ pub(crate) fn prepare_separation(
 
 impl SeparationTask {
     /// The model for the search.
-    pub(crate) fn plant<'a>(
-        &'a self,
-        inner: &'a ModelPlant<'a>,
-        model: &'a Model,
-    ) -> SeparatingPlant<'a> {
+    pub(crate) fn plant<'a>(&'a self, inner: &'a ModelPlant<'a>, model: &'a Model) -> SeparatingPlant<'a> {
         SeparatingPlant {
             inner,
             model,
@@ -186,10 +173,7 @@ impl SeparationTask {
     }
 
     /// The distance of the effects along the recordings; `None` without recordings.
-    pub(crate) fn distance_along_recordings(
-        &self,
-        model: &Model,
-    ) -> Outcome<Option<EffectDistance>> {
+    pub(crate) fn distance_along_recordings(&self, model: &Model) -> Outcome<Option<EffectDistance>> {
         if self.data.is_empty() {
             return Ok(None);
         }
@@ -220,8 +204,7 @@ impl SeparationTask {
 /// Unit of the forces of a model, or of both kinds.
 pub(crate) fn common_force_unit(model: &Model) -> &'static str {
     let mechanism = &model.derivation.mechanism;
-    let carries =
-        |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
+    let carries = |drive: &modelmill_spec::ModelDrive| drive.kind.place_load(&mechanism.coordinates);
     // The unit is common only if all drives have it.
     let forces = mechanism
         .drives
@@ -295,28 +278,19 @@ impl SeparationResult {
 
     /// The result as lines of text. `evaluations` is the number of evaluated trajectories, `random` that of random
     /// ones.
-    pub fn text(
-        &self,
-        evaluations: usize,
-        random: usize,
-        spelling: &dyn RemedySpelling,
-    ) -> Vec<String> {
+    pub fn text(&self, evaluations: usize, random: usize, spelling: &dyn RemedySpelling) -> Vec<String> {
         let pair = &self.task.pair;
         let mut lines = vec![format!("  separates {}", self.task.description())];
         let beside: Vec<LocatedEffect> = pair.common_effects().cloned().collect();
         if !beside.is_empty() {
-            lines.push(format!(
-                "  in addition to {} in both cases",
-                words::effects(&beside)
-            ));
+            lines.push(format!("  in addition to {} in both cases", words::effects(&beside)));
         }
         // The values of the effect scale all figures.
         let sizes: Vec<String> = (pair.sizes().iter())
             .map(|(symbol, value)| format!("{symbol} = {}", significant(*value, 5)))
             .collect();
         lines.push(if sizes.is_empty() {
-            "  no size is given: each parameter of the effect is 1 in its unit, of either sign"
-                .to_owned()
+            "  no size is given: each parameter of the effect is 1 in its unit, of either sign".to_owned()
         } else {
             format!("  with {}", sizes.join(", "))
         });
@@ -348,20 +322,13 @@ impl SeparationResult {
             rows.push(row("the recordings", before, self.task.samples()));
         }
         rows.push(vec![
-            format!(
-                "best of {}",
-                count(random, "random trajectory", "random trajectories")
-            ),
+            format!("best of {}", count(random, "random trajectory", "random trajectories")),
             String::new(),
             force(self.random),
             String::new(),
             String::new(),
         ]);
-        rows.push(row(
-            "one period of this trajectory",
-            &self.distance,
-            self.samples,
-        ));
+        rows.push(row("one period of this trajectory", &self.distance, self.samples));
         lines.extend(table(
             2,
             &[

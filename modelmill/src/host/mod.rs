@@ -138,12 +138,9 @@ impl Host {
     ///
     /// Fails with every finding about the files, each with its place.
     pub fn load(&self, path: &Path) -> Outcome<LoadedModel> {
-        run_job(
-            &*self.progress,
-            &format!("reading {}", path.display()),
-            0,
-            |_| modelmill_spec::load_file_with(path, &self.libraries, self.files()),
-        )?
+        run_job(&*self.progress, &format!("reading {}", path.display()), 0, |_| {
+            modelmill_spec::load_file_with(path, &self.libraries, self.files())
+        })?
         // A valid file of another kind gets a message that names the kind.
         .map_err(|failure| match kinds_of_files::file_kind(self, path) {
             Some(kind) => Error::input(format!(
@@ -164,23 +161,16 @@ impl Host {
     /// Fails with every finding about the files, each with its place.
     pub fn load_text(&self, path: &Path, text: &str) -> Outcome<LoadedModel> {
         let name = path.to_string_lossy();
-        Ok(modelmill_spec::load_with(
-            &name,
-            text,
-            &self.libraries,
-            self.files(),
-        )?)
+        Ok(modelmill_spec::load_with(&name, text, &self.libraries, self.files())?)
     }
 
     /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
     ///
     /// Fails when the edited file is invalid: unknown kind or place, a missing value, or an effect given twice.
     pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<EditedModel> {
-        add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| {
-            match failure {
-                EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
-                EditFailure::Model(failure) => (*failure).into(),
-            }
+        add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| match failure {
+            EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
+            EditFailure::Model(failure) => (*failure).into(),
         })
     }
 
@@ -188,12 +178,7 @@ impl Host {
     /// unknown.
     ///
     /// Fails with [`Error::Cancelled`] if it was requested to stop.
-    pub fn run_job<T>(
-        &self,
-        what: &str,
-        total: usize,
-        work: impl FnOnce(&JobHandle) -> T,
-    ) -> Outcome<T> {
+    pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
         run_job(&*self.progress, what, total, work)
     }
 

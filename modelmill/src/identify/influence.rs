@@ -9,7 +9,7 @@ use super::standstill;
 use super::thresholds::FAULT_INFLUENCE_LEAST_SIGMAS;
 use crate::model::Model;
 use crate::recording::PreparedRecording;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::{number, significant};
 
 /// The note on the base parameter that the faults change most, in its standard deviations; `None` if no fault was

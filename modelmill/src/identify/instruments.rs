@@ -11,7 +11,7 @@ use crate::identify::thresholds::{
     INSTRUMENT_TIME_TOLERANCE_STEPS,
 };
 use crate::recording::PreparedRecording;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// The source of instruments, against noise that is correlated with the states through the controller.
 #[derive(Clone, Copy, Default)]
@@ -48,15 +48,9 @@ pub(crate) fn instrument_segments(
     match instruments {
         // The first case has returned before.
         Instruments::None => Ok(Vec::new()),
-        Instruments::Period(period) => data
-            .iter()
-            .map(|one| shift_by_period(one, *period))
-            .collect(),
+        Instruments::Period(period) => data.iter().map(|one| shift_by_period(one, *period)).collect(),
         Instruments::Recordings(recordings) => {
-            let all: Vec<RecordingSegment> = recordings
-                .iter()
-                .flat_map(|one| one.segments.clone())
-                .collect();
+            let all: Vec<RecordingSegment> = recordings.iter().flat_map(|one| one.segments.clone()).collect();
             check_same_times(data, &all)?;
             Ok(all)
         }
@@ -78,10 +72,7 @@ fn check_same_times(data: &[RecordingSegment], instruments: &[RecordingSegment])
     for (own, theirs) in data.iter().zip(instruments) {
         // Times are compared sample by sample, within a part of the smallest step.
         let (a, b) = (&own.run.time, &theirs.run.time);
-        let step = a
-            .windows(2)
-            .map(|w| w[1] - w[0])
-            .fold(f64::INFINITY, f64::min);
+        let step = a.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);
         // Times may differ by rounding only.
         let apart = a
             .iter()
@@ -119,10 +110,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
     let time = &data.run.time;
     let n = time.len();
     // A period must fit into the recording one and a half times.
-    let span = time
-        .last()
-        .zip(time.first())
-        .map_or(0.0, |(last, first)| last - first);
+    let span = time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first);
     let step = span / n.saturating_sub(1).max(1) as f64;
     if span < INSTRUMENT_FEWEST_PERIODS * period || period < INSTRUMENT_PERIOD_FEWEST_STEPS * step {
         return Err(Error::input(format!(
@@ -134,11 +122,7 @@ fn shift_by_period(data: &RecordingSegment, period: f64) -> Outcome<RecordingSeg
     // By time, not by a number of samples, since steps may be uneven.
     let nearest = |t: f64| {
         let at = time.partition_point(|x| *x < t).clamp(1, n - 1);
-        if t - time[at - 1] < time[at] - t {
-            at - 1
-        } else {
-            at
-        }
+        if t - time[at - 1] < time[at] - t { at - 1 } else { at }
     };
     // Near the end the period before is used.
     let mut places = Vec::with_capacity(n);

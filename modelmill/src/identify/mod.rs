@@ -13,8 +13,8 @@ use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_identify::estimate::FEWEST_ROWS;
 use modelmill_identify::fit_parameters;
 use modelmill_identify::{
-    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus,
-    RecordingNote, RunRepeatability,
+    ErrorFigures, EstimatorOutput, FitFile, FitParameter, ParameterInfo, ParameterStatus, RecordingNote,
+    RunRepeatability,
 };
 use modelmill_spec::Sign;
 
@@ -23,7 +23,7 @@ use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::{self, PreparedRecording};
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::{count, number};
 
 pub use instruments::Instruments;
@@ -187,8 +187,7 @@ pub fn identify(
     let finite = |value: f64| value.is_finite().then_some(value);
     let of_recordings = recordings.flat_map(RecordingSegment::notes).cloned();
     // The fit file contains all notes, also those of the recordings.
-    let mut all_notes: Vec<RecordingNote> =
-        model.caution().into_iter().chain(of_recordings).collect();
+    let mut all_notes: Vec<RecordingNote> = model.caution().into_iter().chain(of_recordings).collect();
     all_notes.extend(notes.iter().cloned());
     let constants = &model.derivation.mechanism.constants;
     Ok(Identification {
@@ -199,10 +198,7 @@ pub fn identify(
             scaled_condition_number: finite(solution.scaled_condition_number),
             covariance: covariance(&found, parameters.len()),
             parameters,
-            constants: constants
-                .iter()
-                .map(|c| (c.name.clone(), c.value))
-                .collect(),
+            constants: constants.iter().map(|c| (c.name.clone(), c.value)).collect(),
             undetermined: solution.describe_undetermined(&names),
             fit,
             check,
@@ -227,8 +223,7 @@ fn covariance(found: &RegressionEstimate, n: usize) -> Option<Vec<Vec<f64>>> {
             rows[*i][*j] = found.deviations.covariance[(a, b)];
         }
     }
-    let is_known = found.deviations.std.iter().all(|s| s.is_finite())
-        && rows.iter().flatten().all(|c| c.is_finite());
+    let is_known = found.deviations.std.iter().all(|s| s.is_finite()) && rows.iter().flatten().all(|c| c.is_finite());
     is_known.then_some(rows)
 }
 
@@ -248,17 +243,10 @@ fn known_parameter(info: &ParameterInfo, value: f64) -> FitParameter {
 }
 
 /// Notes on the result: known and undetermined parameters, weak instruments, few equations, impossible signs.
-fn remarks(
-    model: &Model,
-    found: &RegressionEstimate,
-    parameters: &[FitParameter],
-) -> Vec<RecordingNote> {
+fn remarks(model: &Model, found: &RegressionEstimate, parameters: &[FitParameter]) -> Vec<RecordingNote> {
     let solution = &found.solution;
     let mut notes = Vec::new();
-    for p in parameters
-        .iter()
-        .filter(|p| p.status == ParameterStatus::Known)
-    {
+    for p in parameters.iter().filter(|p| p.status == ParameterStatus::Known) {
         notes.push(RecordingNote::info(format!(
             "{} = {} contains numbers of the model file only. It is known and not identified; its force is subtracted \
              from the measured one.",
@@ -277,11 +265,7 @@ fn remarks(
         )));
     }
     // Reweighting may alternate between two solutions.
-    if found
-        .weighting
-        .as_ref()
-        .is_some_and(|weighting| !weighting.converged)
-    {
+    if found.weighting.as_ref().is_some_and(|weighting| !weighting.converged) {
         notes.push(RecordingNote::warning(message!(
             "The weights have not converged: residuals depend on the weights from one solution to the next; leave out \
              {} or {}.",
@@ -361,12 +345,7 @@ fn undetermined_text(p: &FitParameter) -> String {
         Some(nominal) if number(nominal) == value => {
             format!("{} = {value} {} (its nominal value)", p.name, p.unit)
         }
-        Some(nominal) => format!(
-            "{} = {value} {} (nominal {})",
-            p.name,
-            p.unit,
-            number(nominal)
-        ),
+        Some(nominal) => format!("{} = {value} {} (nominal {})", p.name, p.unit, number(nominal)),
         None => format!(
             "{} = {value} {} (the file gives no nominal value; 0 is used)",
             p.name, p.unit

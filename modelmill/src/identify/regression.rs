@@ -4,12 +4,8 @@
 use modelmill_boundary::message;
 use modelmill_boundary::text::{Message, OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates, PoseFault};
-use modelmill_identify::estimate::{
-    EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments,
-};
-use modelmill_identify::{
-    FilterError, LeastSquaresError, ParameterUncertainty, RegressionSolution, decimate_table,
-};
+use modelmill_identify::estimate::{EstimateOptions, RowVisitor, RowWeighting, estimate, estimate_with_instruments};
+use modelmill_identify::{FilterError, LeastSquaresError, ParameterUncertainty, RegressionSolution, decimate_table};
 
 use crate::along::{included_forces, interleave};
 use crate::error::{Error, Outcome};
@@ -17,8 +13,8 @@ use crate::identify::options::{EquationWeights, EstimatorOptions};
 use crate::identify::refine::{RefinementResult, refine};
 use crate::model::Model;
 use crate::progress::JobHandle;
-use crate::stretch::RecordingSegment;
-use crate::stretch::variances;
+use crate::segment::RecordingSegment;
+use crate::segment::variances;
 use crate::text::table::count;
 
 /// Largest number of regressor entries that are kept between passes: 32 MB; above, computing again is faster than
@@ -71,8 +67,7 @@ pub fn identify(
         )));
     }
     // Known parameters are subtracted, the others are estimated.
-    let (known, unknown): (Vec<usize>, Vec<usize>) =
-        (0..model.base.len()).partition(|k| model.is_known(*k));
+    let (known, unknown): (Vec<usize>, Vec<usize>) = (0..model.base.len()).partition(|k| model.is_known(*k));
     if unknown.is_empty() {
         return Err(Error::input(format!(
             "{}: every base parameter is a number of the file, so there is nothing to identify; \
@@ -87,16 +82,7 @@ pub fn identify(
     let mut runs = data
         .iter()
         .enumerate()
-        .map(|(k, one)| {
-            RegressionRows::new(
-                model,
-                one,
-                instruments.get(k),
-                &known,
-                &unknown,
-                args.weights,
-            )
-        })
+        .map(|(k, one)| RegressionRows::new(model, one, instruments.get(k), &known, &unknown, args.weights))
         .collect::<Outcome<Vec<RegressionRows<'_>>>>()?;
     check_equation_count(data, &runs, unknown.len(), model)?;
     check_forces_nonzero(data, &runs)?;
@@ -105,54 +91,51 @@ pub fn identify(
     let by_channel = args.weights == EquationWeights::Channels;
     let reweighted = by_channel || args.robust.is_some();
     let passes = if reweighted { 0 } else { 3 };
-    model
-        .host()
-        .run_job("identifying", passes * samples, |job| {
-            // Rows are kept in memory if they are few, so that later passes are fast.
-            for run in &mut runs {
-                run.keep_if_small(job)?;
-            }
-            let channels = model.drives().len();
-            // The estimator requests the rows in several passes.
-            let show = |visit: &mut RowVisitor<'_>| -> Outcome {
-                runs.iter()
-                    .try_for_each(|run| run.visit_rows::<Error>(job, visit))
-            };
-            // Instrumental variables have their own estimator and no refinement.
-            if !instruments.is_empty() {
-                let found = estimate_with_instruments(unknown.len(), channels, show)?;
-                return Ok(RegressionEstimate {
-                    solution: found.solution,
-                    deviations: found.uncertainty,
-                    unknown: unknown.clone(),
-                    weighting: None,
-                    refined: RefinementResult::Nothing,
-                    instruments: Some(InstrumentStatistics {
-                        strength: found.strength,
-                        least_squares: found.least_squares.values,
-                    }),
-                });
-            }
-            // Weights by drive and robust weights are iterated by the estimator.
-            let options = EstimateOptions {
-                by_channel,
-                huber: args.robust,
-                ..EstimateOptions::default()
-            };
-            // Least squares, then the refinement of its reduced rows.
-            let mut found = estimate(&nominal, channels, &options, show)?;
-            let refined = refine(model, &mut found, &unknown, &nominal, args.refinement)?;
-            let weighting = found.weighting;
-            let is_weighted = weighting.by_channel || weighting.huber.is_some();
-            Ok(RegressionEstimate {
+    model.host().run_job("identifying", passes * samples, |job| {
+        // Rows are kept in memory if they are few, so that later passes are fast.
+        for run in &mut runs {
+            run.keep_if_small(job)?;
+        }
+        let channels = model.drives().len();
+        // The estimator requests the rows in several passes.
+        let show = |visit: &mut RowVisitor<'_>| -> Outcome {
+            runs.iter().try_for_each(|run| run.visit_rows::<Error>(job, visit))
+        };
+        // Instrumental variables have their own estimator and no refinement.
+        if !instruments.is_empty() {
+            let found = estimate_with_instruments(unknown.len(), channels, show)?;
+            return Ok(RegressionEstimate {
                 solution: found.solution,
                 deviations: found.uncertainty,
                 unknown: unknown.clone(),
-                weighting: is_weighted.then_some(weighting),
-                refined,
-                instruments: None,
-            })
-        })?
+                weighting: None,
+                refined: RefinementResult::Nothing,
+                instruments: Some(InstrumentStatistics {
+                    strength: found.strength,
+                    least_squares: found.least_squares.values,
+                }),
+            });
+        }
+        // Weights by drive and robust weights are iterated by the estimator.
+        let options = EstimateOptions {
+            by_channel,
+            huber: args.robust,
+            ..EstimateOptions::default()
+        };
+        // Least squares, then the refinement of its reduced rows.
+        let mut found = estimate(&nominal, channels, &options, show)?;
+        let refined = refine(model, &mut found, &unknown, &nominal, args.refinement)?;
+        let weighting = found.weighting;
+        let is_weighted = weighting.by_channel || weighting.huber.is_some();
+        Ok(RegressionEstimate {
+            solution: found.solution,
+            deviations: found.uncertainty,
+            unknown: unknown.clone(),
+            weighting: is_weighted.then_some(weighting),
+            refined,
+            instruments: None,
+        })
+    })?
 }
 
 /// Fails when there are fewer equations than unknown parameters.
@@ -236,10 +219,7 @@ impl<'a> RegressionRows<'a> {
         // Weights from variances need a variance for every drive.
         let spread = if weights == EquationWeights::Variance {
             let Some(variance) = &data.variance else {
-                let columns: Vec<String> = drives
-                    .iter()
-                    .map(|d| format!("`{}`", variances::column(d)))
-                    .collect();
+                let columns: Vec<String> = drives.iter().map(|d| format!("`{}`", variances::column(d))).collect();
                 let weights = |value: &str| Remedy::option(OptionName::Weights).with_value(value);
                 return Err(Error::input(message!(
                     "{}: {} needs the variance of every drive's force, in the columns {}; name yours \
@@ -251,12 +231,7 @@ impl<'a> RegressionRows<'a> {
                     weights("channels")
                 )));
             };
-            Some(variances::factors(
-                variance,
-                &data.run,
-                &drives,
-                data.decimation(),
-            )?)
+            Some(variances::factors(variance, &data.run, &drives, data.decimation())?)
         } else {
             None
         };
@@ -316,9 +291,7 @@ impl<'a> RegressionRows<'a> {
         // The last window ends with the segment.
         if decimation > 1 {
             let have = window.table.len() / width;
-            window
-                .decimate(width, decimation, have, &mut kept)
-                .map_err(failed)?;
+            window.decimate(width, decimation, have, &mut kept).map_err(failed)?;
         }
         self.kept = Some(kept);
         Ok(())
@@ -348,12 +321,7 @@ impl<'a> RegressionRows<'a> {
 
     /// Passes weighted rows of the unknown columns to `visit`, with the force of known columns subtracted from the
     /// measured values; `first` is the index of the first row.
-    fn visit_unknown(
-        &self,
-        w: &[f64],
-        first: usize,
-        visit: &mut RowVisitor<'_>,
-    ) -> Result<(), LeastSquaresError> {
+    fn visit_unknown(&self, w: &[f64], first: usize, visit: &mut RowVisitor<'_>) -> Result<(), LeastSquaresError> {
         // The measured forces and weights of these rows.
         let at = first..first + w.len() / self.width();
         let measured = &self.measured[at.clone()];
@@ -381,10 +349,7 @@ impl<'a> RegressionRows<'a> {
 
     /// Passes blocks of the regressor to `visit`, row by row; each row of the instruments is followed by that of the
     /// recording.
-    fn blocks<E: From<Error>>(
-        &self,
-        visit: &mut dyn FnMut(&[f64]) -> Result<(), E>,
-    ) -> Result<(), E> {
+    fn blocks<E: From<Error>>(&self, visit: &mut dyn FnMut(&[f64]) -> Result<(), E>) -> Result<(), E> {
         let evaluator = ModelEvaluator::new(&self.model.derivation);
         let drives = self.model.drives().len();
         let width = self.width();
@@ -456,9 +421,7 @@ impl DecimationWindow {
 /// Weights of the rows from both variances and excluded equations.
 fn combined_factors(spread: Option<Vec<f64>>, weights: Option<&[f64]>) -> Option<Vec<f64>> {
     match (spread, weights) {
-        (Some(spread), Some(weights)) => {
-            Some(spread.iter().zip(weights).map(|(s, w)| s * w).collect())
-        }
+        (Some(spread), Some(weights)) => Some(spread.iter().zip(weights).map(|(s, w)| s * w).collect()),
         (spread, weights) => spread.or_else(|| weights.map(<[f64]>::to_vec)),
     }
 }

@@ -8,18 +8,14 @@ use modelmill_identify::RecordingNote;
 use crate::along::drive_rates;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 use crate::text::table::count;
 
 /// Gives equations at standstill the weight 0, and adds a note with their number.
 ///
 /// `part` is the fraction of a drive's fastest rate below which it is at standstill. Fails when all equations of a
 /// drive would be excluded.
-pub(crate) fn exclude_standstill(
-    model: &Model,
-    data: &mut [RecordingSegment],
-    part: f64,
-) -> Outcome {
+pub(crate) fn exclude_standstill(model: &Model, data: &mut [RecordingSegment], part: f64) -> Outcome {
     let drives = model.drives();
     // Rates at the decimated samples, since these are the equations of the fit.
     let rates: Vec<Vec<Vec<f64>>> = data
@@ -43,9 +39,7 @@ pub(crate) fn exclude_standstill(
         let samples = run.first().map_or(0, Vec::len);
         of += samples;
         // Weights of other exclusions are kept.
-        let weights = one
-            .weights
-            .get_or_insert_with(|| vec![1.0; samples * drives.len()]);
+        let weights = one.weights.get_or_insert_with(|| vec![1.0; samples * drives.len()]);
         for (k, row) in weights.chunks_exact_mut(drives.len()).enumerate() {
             for (d, weight) in row.iter_mut().enumerate() {
                 if run[d][k].abs() <= part * fastest[d] {

@@ -19,14 +19,9 @@ pub struct EntryChange {
 
 /// Named entries that differ, in the order of the first list, then of the second.
 fn changed_entries(before: &[(String, String)], after: &[(String, String)]) -> Vec<EntryChange> {
-    let find = |list: &[(String, String)], name: &str| {
-        list.iter()
-            .find(|(n, _)| n == name)
-            .map(|(_, text)| text.clone())
-    };
-    let added = after
-        .iter()
-        .filter(|(name, _)| find(before, name).is_none());
+    let find =
+        |list: &[(String, String)], name: &str| list.iter().find(|(n, _)| n == name).map(|(_, text)| text.clone());
+    let added = after.iter().filter(|(name, _)| find(before, name).is_none());
     before
         .iter()
         .chain(added)
@@ -108,26 +103,17 @@ impl ModelChanges {
             let reduction = &model.derivation.reduction;
             let mechanism = &model.derivation.mechanism;
             let with = reduction.products.iter().map(|p| (p, "in p_g"));
-            let without = reduction
-                .without_effect
-                .iter()
-                .map(|p| (p, "without effect"));
+            let without = reduction.without_effect.iter().map(|p| (p, "without effect"));
             with.chain(without)
                 .map(|(p, text)| (p.text(mechanism), text.to_owned()))
                 .collect()
         };
         let base = |model: &Model| -> Vec<(String, String)> {
             let list = model.base.iter();
-            list.map(|b| (b.retained.clone(), b.expression.clone()))
-                .collect()
+            list.map(|b| (b.retained.clone(), b.expression.clone())).collect()
         };
         let count = |pick: &dyn Fn(&Model) -> OperationCount| (pick(before), pick(after));
-        let regressor = count(&|m| {
-            m.derivation
-                .programs
-                .regressor
-                .count_operations(ProgramStage::State)
-        });
+        let regressor = count(&|m| m.derivation.programs.regressor.count_operations(ProgramStage::State));
         let dynamics = count(&|m| {
             m.derivation
                 .programs

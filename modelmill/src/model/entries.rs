@@ -2,9 +2,8 @@
 //! one group of tables of the model file.
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, EffectPlace, ExactAngle, ExactExpression, ExactLength, FrameAxis,
-    FrameConvention, FrameStep, Mechanism, ModelEffect, ModelSymbol, PartInertia, PlaceQuantity,
-    TwistAxes,
+    CoordinateIdx, DriveKind, EffectPlace, ExactAngle, ExactExpression, ExactLength, FrameAxis, FrameConvention,
+    FrameStep, Mechanism, ModelEffect, ModelSymbol, PartInertia, PlaceQuantity, TwistAxes,
 };
 
 /// Collects entries: pairs of a name and a text, in the order of the file.
@@ -80,11 +79,7 @@ fn bodies(m: &Mechanism, entries: &mut ModelEntries) {
     // Both ways of giving an inertia are described as they are written.
     for p in &m.parts {
         let inertial = match &p.inertial {
-            PartInertia::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            } => format!(
+            PartInertia::AboutCentre { mass, centre, inertia } => format!(
                 "mass {}, centre {}, inertia about it {}",
                 text(m, mass),
                 triple(m, centre),
@@ -130,8 +125,7 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
     }
     for c in &m.couplings {
         let terms = c.terms.iter();
-        let terms =
-            terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
+        let terms = terms.map(|(i, factor)| format!("({})*{}", text(m, factor), m.coordinates[i.0].name));
         let offset = (!c.offset.is_zero()).then(|| text(m, &c.offset));
         let all: Vec<String> = terms.chain(offset).collect();
         let name = &m.coordinates[c.coordinate.0].name;
@@ -141,10 +135,9 @@ fn actuation(m: &Mechanism, entries: &mut ModelEntries) {
     for d in &m.drives {
         let how = match d.kind {
             DriveKind::Joint(i) => format!("on the joint {}", m.coordinates[i.0].name),
-            DriveKind::Linear { from, to } => format!(
-                "linear, from {} to {}",
-                m.points[from.0].name, m.points[to.0].name
-            ),
+            DriveKind::Linear { from, to } => {
+                format!("linear, from {} to {}", m.points[from.0].name, m.points[to.0].name)
+            }
         };
         entries.add("drive", &d.name, how);
     }
@@ -258,12 +251,7 @@ fn length_text(m: &Mechanism, length: &ExactLength) -> String {
     let mut terms: Vec<String> = length
         .coordinates
         .iter()
-        .map(|(i, factor)| {
-            times(
-                &factor.to_string(),
-                m.symbol_name(ModelSymbol::Coordinate(*i)),
-            )
-        })
+        .map(|(i, factor)| times(&factor.to_string(), m.symbol_name(ModelSymbol::Coordinate(*i))))
         .collect();
     if !length.offset.is_zero() {
         terms.push(text(m, &length.offset));

@@ -34,11 +34,7 @@ impl Model {
         let (rank, notes) = self.numeric_rank()?;
         let what = format!("writing the equations of {}", self.name);
         let text = self.host().run_job(&what, 0, |_| {
-            page(
-                &self.derivation,
-                format,
-                rank.as_ref().map(|rank| &rank.numeric_rank),
-            )
+            page(&self.derivation, format, rank.as_ref().map(|rank| &rank.numeric_rank))
         })?;
         Ok(EquationsText { text, notes })
     }

@@ -17,8 +17,7 @@ use modelmill_codegen::{BaseParameterEntry, ColumnDependency, Derivation, Parame
 use modelmill_identify::estimate::ParameterPrior;
 use modelmill_identify::{ParameterInfo, RecordingNote};
 use modelmill_spec::{
-    EffectKind, ExactExpression, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity,
-    Sign,
+    EffectKind, ExactExpression, Mechanism, ModelSymbol, ParameterIdx, PartInertia, PlaceQuantity, Sign,
 };
 use nalgebra::DMatrix;
 
@@ -149,10 +148,7 @@ impl Host {
         }
         let stem = Path::new(path).file_stem();
         Ok(Model {
-            name: stem.map_or_else(
-                || mechanism.name.clone(),
-                |s| s.to_string_lossy().into_owned(),
-            ),
+            name: stem.map_or_else(|| mechanism.name.clone(), |s| s.to_string_lossy().into_owned()),
             path: path.to_owned(),
             base: base(&derivation),
             nominal: derivation.nominal_base_values(),
@@ -194,9 +190,7 @@ pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
         let why = match reduction.products.iter().position(|p| *p == wanted) {
             Some(at) if reduction.retained.contains(&at) => continue,
             Some(_) => "its column depends on those of products that are retained before it",
-            None if reduction.without_effect.contains(&wanted) => {
-                "it has no effect on the drives: its column is zero"
-            }
+            None if reduction.without_effect.contains(&wanted) => "it has no effect on the drives: its column is zero",
             None => "there is no such product in the equations",
         };
         says.push((k, format!("`{name}` of `retain` cannot be retained: {why}")));
@@ -214,8 +208,8 @@ fn signs(mechanism: &Mechanism, kinds: &[EffectKind]) -> Vec<Sign> {
         }
     };
     for part in &mechanism.parts {
-        let (PartInertia::AboutCentre { mass, inertia, .. }
-        | PartInertia::Linear { mass, inertia, .. }) = &part.inertial;
+        let (PartInertia::AboutCentre { mass, inertia, .. } | PartInertia::Linear { mass, inertia, .. }) =
+            &part.inertial;
         positive(mass);
         for i in [0, 3, 5] {
             positive(&inertia[i]);
@@ -266,11 +260,7 @@ impl Model {
 
     /// Text of the model file.
     pub fn text(&self) -> &str {
-        self.loaded
-            .sources
-            .files
-            .first()
-            .map_or("", |file| &file.text)
+        self.loaded.sources.files.first().map_or("", |file| &file.text)
     }
 
     /// Paths of all files that were read for it.
@@ -311,11 +301,7 @@ impl Model {
         // The retained product has the factor 1; the others come from the dependencies of columns, eq.
         // (6).
         let mut products = vec![(&reduction.products[reduction.retained[k]], 1.0)];
-        for (line, factors) in reduction
-            .dependencies
-            .iter()
-            .zip(reduction.factors(&constants))
-        {
+        for (line, factors) in reduction.dependencies.iter().zip(reduction.factors(&constants)) {
             if let Some(factor) = factors.get(&k) {
                 products.push((&reduction.products[line.product], *factor));
             }
@@ -376,17 +362,10 @@ impl Model {
                     Sign::Any => return Sign::Any,
                 }
             }
-            if is_positive {
-                Sign::Positive
-            } else {
-                Sign::Negative
-            }
+            if is_positive { Sign::Positive } else { Sign::Negative }
         };
         let products = self.products_of(k);
-        let mut signs = products
-            .iter()
-            .filter(|(_, factor)| *factor != 0.0)
-            .map(sign_of);
+        let mut signs = products.iter().filter(|(_, factor)| *factor != 0.0).map(sign_of);
         let first = signs.next().unwrap_or(Sign::Any);
         if signs.all(|sign| sign == first) {
             first
@@ -430,9 +409,7 @@ impl Model {
     /// Unit of a drive's force: `N` or `N m`.
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
-        mechanism.drives[drive]
-            .kind
-            .force_unit(&mechanism.coordinates)
+        mechanism.drives[drive].kind.force_unit(&mechanism.coordinates)
     }
 
     /// The base parameters as a fit file lists them.
@@ -464,11 +441,7 @@ impl Model {
     /// ```
     #[must_use]
     pub fn with_values(&self, values: &[f64]) -> Self {
-        assert_eq!(
-            values.len(),
-            self.base.len(),
-            "one value per base parameter"
-        );
+        assert_eq!(values.len(), self.base.len(), "one value per base parameter");
         Self {
             nominal: values.to_vec(),
             covariance: None,
@@ -497,19 +470,13 @@ impl Model {
         let scaled = DMatrix::from_fn(n, n, |i, j| part[(i, j)] * scale[i] * scale[j]);
         let inverse = scaled.cholesky()?.inverse();
         let information = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-        information
-            .iter()
-            .all(|x| x.is_finite())
-            .then_some(information)
+        information.iter().all(|x| x.is_finite()).then_some(information)
     }
 
     /// The model with the identified values of another model for all base parameters with the same expression.
     pub(crate) fn with_values_of(mut self, other: &Self) -> Self {
         for (k, base) in self.base.iter().enumerate() {
-            let same = other
-                .base
-                .iter()
-                .position(|one| one.expression == base.expression);
+            let same = other.base.iter().position(|one| one.expression == base.expression);
             if let Some(i) = same.filter(|i| other.identified[*i]) {
                 self.nominal[k] = other.nominal[i];
                 self.identified[k] = true;
@@ -544,12 +511,10 @@ impl Model {
             lumped.push(more);
         }
         // A product has a nominal value if all its factors have one that is not zero.
-        std::iter::once(reduction.retained[k])
-            .chain(lumped)
-            .any(|product| {
-                let powers = &reduction.products[product].0;
-                powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
-            })
+        std::iter::once(reduction.retained[k]).chain(lumped).any(|product| {
+            let powers = &reduction.products[product].0;
+            powers.iter().all(|(p, _)| parameters[*p].nominal != 0.0)
+        })
     }
 
     /// Whether passive coordinates are solved for by Newton's method from state to state, because a closed form is

@@ -73,18 +73,12 @@ impl SampledRank {
 
     /// The gap as a phrase.
     fn gap_text(&self) -> String {
-        format!(
-            "gap of {} to the next singular value",
-            significant(self.gap, 2)
-        )
+        format!("gap of {} to the next singular value", significant(self.gap, 2))
     }
 
     /// A remark for the pages of equations: states that were left out, or a poor condition number; `None` otherwise.
     pub fn remark(&self) -> Option<String> {
-        let is_poor = self
-            .numeric_rank
-            .condition
-            .is_none_or(|c| c > HIGH_CONDITION);
+        let is_poor = self.numeric_rank.condition.is_none_or(|c| c > HIGH_CONDITION);
         (self.left_out > 0 || is_poor).then(|| format!("the numeric rank is {}", self.text()))
     }
 
@@ -115,10 +109,7 @@ pub(crate) fn judge_rank(model: &Model) -> Outcome<RankJudgement> {
     };
     let retained = model.base.len();
     let rank = found.numeric_rank.rank;
-    let is_exact = matches!(
-        model.derivation.reduction.method,
-        ReductionMethod::Exact { .. }
-    );
+    let is_exact = matches!(model.derivation.reduction.method, ReductionMethod::Exact { .. });
     // A rank below or above the number of base parameters means different things for exact and numeric
     // reduction.
     let mut warnings = Vec::new();
@@ -171,9 +162,7 @@ fn sampled_rank(model: &Model) -> Result<SampledRank, String> {
     sampling.draw(&evaluator, wanted)?;
     let (full, retained) = match both_regressors(&evaluator, &sampling.states()) {
         Ok(both) => both,
-        Err(fault) if is_pose_dependent(&fault) => {
-            regressors_state_by_state(&evaluator, &mut sampling, wanted)?
-        }
+        Err(fault) if is_pose_dependent(&fault) => regressors_state_by_state(&evaluator, &mut sampling, wanted)?,
         Err(fault) => return Err(fault.to_string()),
     };
     let found = numeric_rank(&full).map_err(|error| error.to_string())?;
@@ -195,10 +184,7 @@ fn both_regressors(
     evaluator: &ModelEvaluator<'_>,
     states: &MotionStates<'_>,
 ) -> Result<(DMatrix<f64>, DMatrix<f64>), PoseFault> {
-    Ok((
-        evaluator.full_regressor(states)?,
-        evaluator.regressor(states)?,
-    ))
+    Ok((evaluator.full_regressor(states)?, evaluator.regressor(states)?))
 }
 
 /// Whether the fault depends on the pose, so that another state may have a solution.
@@ -298,11 +284,7 @@ impl StateSampling {
                 .active
                 .iter()
                 .map(|(nominal, is_angle)| {
-                    let reach = if *is_angle {
-                        self.reach
-                    } else {
-                        0.5 * self.reach
-                    };
+                    let reach = if *is_angle { self.reach } else { 0.5 * self.reach };
                     nominal + reach * draw(&mut self.random)
                 })
                 .collect();
@@ -351,9 +333,7 @@ impl StateSampling {
     fn single_state(&self, sample: usize) -> MotionStates<'_> {
         let one = |k: usize| {
             let columns = self.columns[k].iter();
-            columns
-                .map(|column| std::slice::from_ref(&column[sample]))
-                .collect()
+            columns.map(|column| std::slice::from_ref(&column[sample])).collect()
         };
         MotionStates {
             q: one(0),

@@ -69,9 +69,7 @@ impl Model {
 
     /// The covariance of a fit's values in the order of the model; `None` if a standard deviation is unknown.
     fn covariance_of(&self, fit: &FitFile) -> Option<DMatrix<f64>> {
-        let unknown: Vec<usize> = (0..self.base.len())
-            .filter(|k| !self.is_known(*k))
-            .collect();
+        let unknown: Vec<usize> = (0..self.base.len()).filter(|k| !self.is_known(*k)).collect();
         // The fit may list its parameters in another order.
         let place = |k: &usize| {
             let named = |one: &FitParameter| one.name == self.base[*k].name;

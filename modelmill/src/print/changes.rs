@@ -21,21 +21,14 @@ impl ModelChanges {
         // The complete base of both models, for comparison.
         let base = |model: &Model| -> Vec<Value> {
             let list = model.base.iter();
-            list.map(
-                |b| json!({ "name": b.name, "retained": b.retained, "expression": b.expression }),
-            )
-            .collect()
+            list.map(|b| json!({ "name": b.name, "retained": b.retained, "expression": b.expression }))
+                .collect()
         };
         // Keys of JSON have no blanks.
         let operations: serde_json::Map<String, Value> = self
             .operations
             .iter()
-            .map(|(name, before, after)| {
-                (
-                    name.replace(' ', "_"),
-                    json!({ "before": before, "after": after }),
-                )
-            })
+            .map(|(name, before, after)| (name.replace(' ', "_"), json!({ "before": before, "after": after })))
             .collect();
         // A numeric reduction is named, since its base is valid for one geometry only.
         let side = |model: &Model| {

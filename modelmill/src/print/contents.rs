@@ -57,10 +57,7 @@ impl RecordingContents {
                 .map(|column| vec![column.name.clone(), column.kind.clone()])
                 .collect();
             if !rows.is_empty() {
-                let head = [
-                    ("column", ColumnAlignment::Left),
-                    ("type", ColumnAlignment::Left),
-                ];
+                let head = [("column", ColumnAlignment::Left), ("type", ColumnAlignment::Left)];
                 lines.extend(table(4, &head, &rows));
             }
         }

@@ -1,8 +1,6 @@
 //! Output of `effects`: the library of effects as JSON, as a table, or one kind in detail.
 
-use modelmill_spec::{
-    ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign,
-};
+use modelmill_spec::{ActsOn, ConstantSearch, EffectKind, KindConstant, KindParameter, PlaceLoad, Scale, Sign};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Outcome};
@@ -56,10 +54,7 @@ fn places(kind: &EffectKind) -> String {
     let joined = all.join(" or ");
     match (kind.places, kind.other) {
         // Effects such as those of gears depend on a second place.
-        (_, Some(other)) => format!(
-            "{joined}, as a function of another place that {}",
-            other.description()
-        ),
+        (_, Some(other)) => format!("{joined}, as a function of another place that {}", other.description()),
         (Some(2), None) => format!("two of: {joined}"),
         _ => joined,
     }
@@ -88,10 +83,7 @@ pub fn kind_text(kind: &EffectKind, style: TerminalStyle) -> String {
         symbols.push(vec![
             one.symbol.clone(),
             units(&one.units),
-            format!(
-                "parameter{}",
-                sign.map_or_else(String::new, |s| format!(", {s}"))
-            ),
+            format!("parameter{}", sign.map_or_else(String::new, |s| format!(", {s}"))),
             one.note.clone(),
         ]);
     }

@@ -57,10 +57,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         put("iterations", json!(weighting.iterations));
         put("settled", json!(weighting.converged));
         if let Some(bound) = weighting.huber {
-            put(
-                "robust",
-                json!({ "bound": bound, "beyond": weighting.outliers }),
-            );
+            put("robust", json!({ "bound": bound, "beyond": weighting.outliers }));
         }
     }
     match &found.refined {
@@ -81,10 +78,7 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
                     })
                 })
                 .collect();
-            put(
-                "essential",
-                json!({ "dropped": dropped, "residual_rise": rise }),
-            );
+            put("essential", json!({ "dropped": dropped, "residual_rise": rise }));
         }
         // Parameters and bodies; the rise of the residual is relative to the solution without bounds.
         RefinementResult::Physical(physical, bodies, before) => {
@@ -119,30 +113,19 @@ pub(crate) fn json(model: &Model, found: &RegressionEstimate, args: &EstimatorOp
         let bias: Vec<Value> = (0..found.unknown.len())
             .map(|i| json!({ "name": model.base[found.unknown[i]].name, "least_squares": least_squares[i] }))
             .collect();
-        put(
-            "instruments",
-            json!({ "strength": strength, "parameters": bias }),
-        );
+        put("instruments", json!({ "strength": strength, "parameters": bias }));
     }
     value
 }
 
 /// The same as lines of text.
-pub(crate) fn text(
-    model: &Model,
-    found: &RegressionEstimate,
-    infos: &[ParameterInfo],
-) -> Vec<String> {
+pub(crate) fn text(model: &Model, found: &RegressionEstimate, infos: &[ParameterInfo]) -> Vec<String> {
     let mut lines = Vec::new();
     let deviations = &found.deviations;
     // Independent samples, since they explain the size of the standard deviations.
     if let Some(effective) = effective_samples(found) {
         // One correlation for each drive.
-        let correlations: Vec<String> = deviations
-            .residual_lag1
-            .iter()
-            .map(|c| significant(*c, 2))
-            .collect();
+        let correlations: Vec<String> = deviations.residual_lag1.iter().map(|c| significant(*c, 2)).collect();
         lines.push(format!(
             "The residuals are correlated in time (at lag 1, per drive: {}), so these {} samples are worth about {} \
              independent ones.",
@@ -160,19 +143,13 @@ pub(crate) fn text(
             .iter()
             .zip(model.drives())
             .enumerate()
-            .map(|(d, (s, drive))| {
-                format!("{drive} {} {}", significant(*s, 3), model.force_unit(d))
-            })
+            .map(|(d, (s, drive))| format!("{drive} {} {}", significant(*s, 3), model.force_unit(d)))
             .collect();
         lines.push(format!(
             "noise of each drive used as weight: {} ({}{})",
             scales.join(", "),
             count(weighting.iterations, "iteration", "iterations"),
-            if weighting.converged {
-                ""
-            } else {
-                ", not converged"
-            }
+            if weighting.converged { "" } else { ", not converged" }
         ));
         // Robust weights reduce the influence of outliers.
         if let Some(bound) = weighting.huber {
@@ -288,12 +265,7 @@ fn recording_share_text(physical: &PhysicalParameters, i: usize) -> String {
 
 /// Physical parameters as a table, with the growth of the residual and bodies at the limit of what is possible.
 /// `before` is the residual norm without the bounds.
-fn physical_text(
-    model: &Model,
-    physical: &PhysicalParameters,
-    bodies: &[String],
-    before: f64,
-) -> Vec<String> {
+fn physical_text(model: &Model, physical: &PhysicalParameters, bodies: &[String], before: f64) -> Vec<String> {
     let parameters = &model.derivation.mechanism.parameters;
     // One row for each parameter, with the share that the recordings determine.
     let rows: Vec<Vec<String>> = parameters
@@ -313,9 +285,7 @@ fn physical_text(
     // Parameters of effects that cannot be negative, such as friction, are in the same list as bodies.
     let terms = model.derivation.mechanism.effects.iter();
     let terms = terms.flat_map(|effect| &effect.terms);
-    let of_effects: Vec<&str> = terms
-        .map(|term| parameters[term.parameter.0].name.as_str())
-        .collect();
+    let of_effects: Vec<&str> = terms.map(|term| parameters[term.parameter.0].name.as_str()).collect();
     let is_of_effect = |name: &&String| of_effects.contains(&name.as_str());
     let others = bodies.iter().filter(is_of_effect).count();
     // The head says how much the bounds cost.
@@ -325,10 +295,7 @@ fn physical_text(
             count(bodies.len() - others, "body", "bodies"),
             match others {
                 0 => String::new(),
-                n => format!(
-                    ", and {}",
-                    count(n, "parameter of effects", "parameters of effects")
-                ),
+                n => format!(", and {}", count(n, "parameter of effects", "parameters of effects")),
             },
             percent(Some(physical.residual_norm / before - 1.0))
         ),

@@ -71,11 +71,7 @@ impl DiagnosisFindings {
             .map(|(d, (channel, budget))| {
                 // A drive without force has no relative parts.
                 let part = |x: f64| {
-                    if budget.force > 0.0 {
-                        x / budget.force
-                    } else {
-                        0.0
-                    }
+                    if budget.force > 0.0 { x / budget.force } else { 0.0 }
                 };
                 let value = json!({
                     "noise": part(budget.noise),
@@ -148,13 +144,7 @@ impl DiagnosisFindings {
         lines.push(style.bold("Error after each added effect, relative to the force (nrms)"));
         // Errors after each step, on fitted and on validation data.
         let rows: Vec<Vec<String>> = (diagnosis.steps.iter())
-            .map(|rung| {
-                vec![
-                    words::rung(rung),
-                    percent(Some(rung.fit)),
-                    percent(Some(rung.check)),
-                ]
-            })
+            .map(|rung| vec![words::rung(rung), percent(Some(rung.fit)), percent(Some(rung.check))])
             .collect();
         lines.extend(table(
             2,
@@ -170,20 +160,15 @@ impl DiagnosisFindings {
         self.missing_text(style, spelling, &mut lines);
         self.disturbances_text(style, &mut lines);
         lines.push(String::new());
-        lines.push(
-            style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
-                "Where the residual is largest"
-            } else {
-                "Where the error without added effects is largest"
-            }),
-        );
+        lines.push(style.bold(if diagnosis.verdict == DiagnosisVerdict::Unexplained {
+            "Where the residual is largest"
+        } else {
+            "Where the error without added effects is largest"
+        }));
         let places = &self.regions;
         lines.extend(places.iter().map(|region| format!("  {}.", region.says)));
         if places.is_empty() {
-            lines.push(
-                "  Nowhere in particular: no range of a coordinate, rate, load or time stands out."
-                    .to_owned(),
-            );
+            lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
         }
         lines.extend(laws::text(&self.laws, &self.before.model, style, spelling));
         self.refused_text(style, &mut lines);
@@ -254,12 +239,7 @@ impl DiagnosisFindings {
 
     /// Missing effects with their estimates, and effects that explain the recordings equally well. What a kind
     /// means and how to separate it are printed once, at its first place.
-    fn missing_text(
-        &self,
-        style: TerminalStyle,
-        spelling: &dyn StepSpelling,
-        lines: &mut Vec<String>,
-    ) {
+    fn missing_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.missing.is_empty() {
             return;
         }
@@ -282,19 +262,12 @@ impl DiagnosisFindings {
                     said.trim_end().to_owned().trim_end().to_owned()
                 })
                 .collect();
-            lines.push(format!(
-                "  {}: {}",
-                words::effect(&found.effect),
-                values.join(", ")
-            ));
+            lines.push(format!("  {}: {}", words::effect(&found.effect), values.join(", ")));
             // Kinds of the libraries have a text of their own; others are explained here.
             // The text of the library comes first, since users can add kinds.
             let mut kinds = self.answer.candidates.kinds.iter();
             let kind = kinds.find(|kind| kind.name == found.effect.kind);
-            let meaning = kind.map_or_else(
-                || words::meaning(&found.effect.kind),
-                |kind| Some(kind.says.as_str()),
-            );
+            let meaning = kind.map_or_else(|| words::meaning(&found.effect.kind), |kind| Some(kind.says.as_str()));
             if let Some(meaning) = meaning.filter(|_| is_first) {
                 lines.push(style.dim(&format!("    {meaning}")));
             }
@@ -391,12 +364,7 @@ impl DiagnosisFindings {
     }
 
     /// Base parameters whose estimates differ from the nominal values of the file.
-    fn off_nominal_text(
-        &self,
-        style: TerminalStyle,
-        spelling: &dyn StepSpelling,
-        lines: &mut Vec<String>,
-    ) {
+    fn off_nominal_text(&self, style: TerminalStyle, spelling: &dyn StepSpelling, lines: &mut Vec<String>) {
         if self.off_nominal.is_empty() {
             return;
         }
@@ -438,11 +406,7 @@ impl DiagnosisFindings {
         };
         let says = words::verdict(&held.diagnosis, self.channels(), self.validation);
         let says = format!("With all parameters fixed at their nominal values: {says}");
-        lines.extend(
-            words::lines(&says, 98)
-                .iter()
-                .map(|line| format!("  {line}")),
-        );
+        lines.extend(words::lines(&says, 98).iter().map(|line| format!("  {line}")));
         let fix_parameters = Remedy::option(OptionName::Held).spell(spelling);
         lines.push(format!("  (Details: {fix_parameters}.)"));
     }

@@ -46,19 +46,11 @@ impl Identification {
     }
 
     /// The result as text: parameters, quality of the estimate, errors, and the next step.
-    pub fn text(
-        &self,
-        model: &Model,
-        style: TerminalStyle,
-        spelling: &dyn RemedySpelling,
-    ) -> String {
+    pub fn text(&self, model: &Model, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let fit = &self.fit;
         let estimator = estimation::text(model, &self.found, &model.parameter_infos());
         // Parameters known from the file are not counted as identified.
-        let identified = fit
-            .parameters
-            .iter()
-            .filter(|p| p.status != ParameterStatus::Known);
+        let identified = fit.parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         let identified = identified.count();
         let mut lines = vec![style.bold(&format!(
             "{}: {} from {}",

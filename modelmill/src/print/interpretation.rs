@@ -72,26 +72,19 @@ impl InterpretationResult {
     /// The solutions as text, each as a table, after a headline with the method.
     pub fn text(&self, style: TerminalStyle, spelling: &dyn RemedySpelling) -> String {
         let solutions = self.solutions();
-        let unknowns = count(
-            self.unknown.len(),
-            "unknown parameter",
-            "unknown parameters",
-        );
+        let unknowns = count(self.unknown.len(), "unknown parameter", "unknown parameters");
         let equations = count(self.used.len(), "base parameter", "base parameters");
         // The headline states the method, and for exact solutions that there are no others.
         let head = match &self.found {
-            PhysicalInterpretation::Undetermined { .. } => format!(
-                "{}: {equations} do not determine {unknowns}",
-                self.model.name
-            ),
+            PhysicalInterpretation::Undetermined { .. } => {
+                format!("{}: {equations} do not determine {unknowns}", self.model.name)
+            }
             PhysicalInterpretation::Exact { .. } => format!(
                 "{}: {} for {unknowns} from {equations}; there are no others",
                 self.model.name,
                 count(solutions.len(), "real solution", "real solutions"),
             ),
-            PhysicalInterpretation::LeastSquares {
-                is_linear: true, ..
-            } => format!(
+            PhysicalInterpretation::LeastSquares { is_linear: true, .. } => format!(
                 "{}: {unknowns} from {equations} by weighted least squares",
                 self.model.name
             ),
@@ -152,9 +145,7 @@ impl InterpretationResult {
                         .as_ref()
                         .map_or_else(|| "-".to_owned(), |std| significant(std[i], 2)),
                     parameter.unit.clone(),
-                    self.sign_violation(i, one.values[i])
-                        .unwrap_or_default()
-                        .to_owned(),
+                    self.sign_violation(i, one.values[i]).unwrap_or_default().to_owned(),
                 ]
             })
             .collect();
@@ -177,11 +168,7 @@ impl InterpretationResult {
             .zip(&one.residuals)
             .map(|(k, residual)| {
                 let base = &self.model.base[*k];
-                vec![
-                    base.name.clone(),
-                    significant(*residual, 3),
-                    base.unit.clone(),
-                ]
+                vec![base.name.clone(), significant(*residual, 3), base.unit.clone()]
             })
             .collect();
         let columns = [

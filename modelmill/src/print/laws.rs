@@ -10,18 +10,15 @@ use crate::text::TerminalStyle;
 use crate::text::table::{number, percent, significant};
 
 /// The caution that goes with every law.
-pub(crate) const HYPOTHESIS: &str = "A hypothesis that these recordings suggest, not a finding: nothing proves that the machine has it.";
+pub(crate) const HYPOTHESIS: &str =
+    "A hypothesis that these recordings suggest, not a finding: nothing proves that the machine has it.";
 /// Name of the file that the text suggests for the entry of a library.
 pub(crate) const LIBRARY: &str = "laws.toml";
 /// Why a law with memory has no entry.
 pub(crate) const PATH_DEPENDENT_NOTE: &str = "It depends on the earlier motion, which no formula of a library can express. It is reported so that you can search for the cause.";
 
 /// Laws as JSON, the best first, each with its alternatives.
-pub(super) fn laws(
-    laws: &[LawHypothesis],
-    model: &Model,
-    spelling: &dyn StepSpelling,
-) -> Vec<Value> {
+pub(super) fn laws(laws: &[LawHypothesis], model: &Model, spelling: &dyn StepSpelling) -> Vec<Value> {
     let one = |hypothesis: &LawHypothesis| {
         // `near_ties` has the labels of the alternatives, `ties` all of them in full.
         let mut object = law(&hypothesis.law, model, spelling);
@@ -80,12 +77,7 @@ pub(super) fn text(
         match &law.entry {
             Some(entry) => {
                 lines.push(format!("    As a library file, {LIBRARY}:"));
-                lines.extend(
-                    entry
-                        .text
-                        .lines()
-                        .map(|line| style.dim(&format!("      {line}"))),
-                );
+                lines.extend(entry.text.lines().map(|line| style.dim(&format!("      {line}"))));
                 lines.push("    and to add it:".to_owned());
                 let command = spelling.spell_effect_of_library(model, &entry.effect, LIBRARY);
                 lines.push(format!("      {command}"));
@@ -102,8 +94,7 @@ pub(super) fn text(
 /// Parameters of a law with standard deviations and units.
 pub(crate) fn values(law: &ProposedLaw) -> String {
     let value = |p: &crate::diagnose::EffectEstimate| {
-        let deviation =
-            (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
+        let deviation = (p.std).map_or_else(String::new, |std| format!(" ± {}", significant(std, 2)));
         let unit = if p.unit == "1" { "" } else { &p.unit };
         let said = format!("{} = {}{deviation} {unit}", p.name, number(p.value));
         said.trim_end().to_owned()

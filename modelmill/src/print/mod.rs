@@ -25,8 +25,7 @@ use modelmill_identify::RecordingNote;
 use serde_json::Value;
 
 pub use spelling::{
-    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling,
-    StepSpelling,
+    CommandName, LibrarySpelling, Message, OptionName, OptionSetting, Remedy, RemedySpelling, StepSpelling,
 };
 pub use summary::{faults, refusal, warnings};
 

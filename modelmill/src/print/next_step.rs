@@ -16,9 +16,7 @@ impl Identification {
     /// The next step: more information on uncertain parameters, a validation run, or the diagnosis.
     pub fn next_step(&self) -> Message {
         let parameters = &self.fit.parameters;
-        let estimated = parameters
-            .iter()
-            .filter(|p| p.status != ParameterStatus::Known);
+        let estimated = parameters.iter().filter(|p| p.status != ParameterStatus::Known);
         // Parameters that the file declares as known are not counted.
         let n = estimated.clone().count();
         let vague = estimated

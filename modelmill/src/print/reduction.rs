@@ -22,9 +22,7 @@ impl RigReduction {
     /// The same as text: the report of the reduction, and the error of each drive's force.
     pub fn text(&self) -> String {
         let mut text = self.reduction.report.text();
-        text.push_str(
-            "Error - forces of the model compared with those of the rig, relative (nrms)\n",
-        );
+        text.push_str("Error - forces of the model compared with those of the rig, relative (nrms)\n");
         for one in &self.forces {
             let _ = writeln!(text, "  {:<16}{:.1e}", one.drive, one.nrms);
         }

@@ -5,8 +5,7 @@ use serde_json::{Value, json};
 
 use crate::print::RemedySpelling;
 use crate::runs::{
-    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunsComparison,
-    SharedFit,
+    ChangePoint, FittedValue, PhysicalChange, RunChange, RunReport, RunValue, RunsComparison, SharedFit,
 };
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, table, with_deviation};
@@ -23,18 +22,12 @@ impl RunsComparison {
     pub fn json(&self, spelling: &dyn RemedySpelling) -> Value {
         let later = || self.runs.iter().enumerate().skip(1);
         // All figures are relative to the first run.
-        let moved = later().flat_map(|(k, run)| {
-            run.moved
-                .iter()
-                .map(move |p| self.moved_parameter_json(k, *p))
-        });
+        let moved = later().flat_map(|(k, run)| run.moved.iter().map(move |p| self.moved_parameter_json(k, *p)));
         let all = self.runs.iter().enumerate();
         // Events within the first run are listed as well, with the pair of indices 0 and 0.
-        let changes =
-            all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
+        let changes = all.flat_map(|(k, run)| run.changes.iter().map(move |one| change_json([0, k], one)));
         let unread = self.unread.iter();
-        let unread =
-            unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
+        let unread = unread.map(|one| json!({ "file": one.file, "says": one.error.spell(spelling) }));
         // Each run with its own fit.
         let runs = self.runs.iter().map(|run| {
             json!({
@@ -86,9 +79,10 @@ impl RunsComparison {
             Some(json!({ "name": info.name, "expression": info.expression, "value": value.value, "std": value.deviation, "unit": info.unit }))
         });
         // Factors of force signals, which need a known load.
-        let gains = fit.gains.iter().map(
-            |(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }),
-        );
+        let gains = fit
+            .gains
+            .iter()
+            .map(|(drive, gain)| json!({ "drive": drive, "gain": gain.value, "std": gain.deviation }));
         // Values of each run, absolute or relative to the first run.
         let runs = fit.runs.iter().map(|(file, values)| {
             let values = values.iter().map(|one| {
@@ -185,13 +179,7 @@ impl RunsComparison {
     }
 
     /// A run compared with the first one.
-    fn write_run(
-        &self,
-        first: &RunReport,
-        run: &RunReport,
-        lines: &mut Vec<String>,
-        style: TerminalStyle,
-    ) {
+    fn write_run(&self, first: &RunReport, run: &RunReport, lines: &mut Vec<String>, style: TerminalStyle) {
         lines.push(String::new());
         lines.push(style.bold(&run.file));
         write_changes(&run.changes, lines);
@@ -342,9 +330,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         None => ["not identifiable".to_owned(), String::new()],
     };
     if !fit.gains.is_empty() {
-        lines.push(
-            "  Factors of the force signals (true force = factor times measured force):".to_owned(),
-        );
+        lines.push("  Factors of the force signals (true force = factor times measured force):".to_owned());
         // One row for each drive.
         let rows: Vec<Vec<String>> = (fit.gains.iter())
             .map(|(drive, gain)| [vec![drive.clone()], text(*gain).to_vec()].concat())
@@ -367,16 +353,9 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
             } else {
                 ""
             };
-            [
-                one.quantity.as_str(),
-                &one.name,
-                &value,
-                &deviation,
-                &one.unit,
-                against,
-            ]
-            .map(str::to_owned)
-            .to_vec()
+            [one.quantity.as_str(), &one.name, &value, &deviation, &one.unit, against]
+                .map(str::to_owned)
+                .to_vec()
         };
         // Values that a run does not determine are listed below the table.
         let known = values.iter().filter(|one| one.value.deviation.is_some());
@@ -391,9 +370,7 @@ fn write_shared_fit(fit: &SharedFit, lines: &mut Vec<String>, style: TerminalSty
         ];
         lines.extend(table(4, &columns, &rows));
         let unknown = values.iter().filter(|one| one.value.deviation.is_none());
-        let unknown: Vec<String> = unknown
-            .map(|one| format!("{} of {}", one.name, one.quantity))
-            .collect();
+        let unknown: Vec<String> = unknown.map(|one| format!("{} of {}", one.name, one.quantity)).collect();
         if !unknown.is_empty() {
             lines.push(format!("    not identifiable: {}", unknown.join(", ")));
         }

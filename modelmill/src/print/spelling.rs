@@ -33,12 +33,7 @@ pub trait StepSpelling: RemedySpelling {
 /// Plain words for a caller of the library.
 impl StepSpelling for LibrarySpelling {
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String {
-        let mut says = format!(
-            "{}: add {} at {}",
-            model.name,
-            effect.kind,
-            effect.at.join(", ")
-        );
+        let mut says = format!("{}: add {} at {}", model.name, effect.kind, effect.at.join(", "));
         let parameters = effect.parameters.iter();
         let values = parameters.filter_map(|p| Some((p.symbol.as_str(), p.nominal?)));
         let constants = effect.constants.iter().map(|(s, v)| (s.as_str(), *v));

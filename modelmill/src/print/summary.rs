@@ -6,8 +6,7 @@ use modelmill_codegen::review::NumericMethod;
 use modelmill_codegen::{BaseReduction, Derivation, ReductionMethod};
 use modelmill_emit::module_name;
 use modelmill_spec::{
-    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel,
-    Mechanism, SourceFiles,
+    CoordinateMotion, Diagnostic, DiagnosticSeverity, DriveKind, LoadFailure, LoadedModel, Mechanism, SourceFiles,
 };
 use serde_json::{Value, json};
 
@@ -39,9 +38,7 @@ impl ModelCheck {
         // A reduction for one geometry and a rank that is uncertain.
         let caution = model.derivation.reduction.method.caution();
         let judged = caution.iter().chain(&self.warnings);
-        warnings.extend(
-            judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })),
-        );
+        warnings.extend(judged.map(|says| json!({ "severity": "warning", "says": says, "file": model.path })));
         let mut object = self.summary.json(&model.name, &model.derivation, &warnings);
         object["numeric_rank"] = self.rank.as_ref().map_or(Value::Null, SampledRank::json);
         object
@@ -77,11 +74,7 @@ pub fn warnings(loaded: &LoadedModel, spelling: &dyn RemedySpelling) -> Vec<Valu
 }
 
 /// Diagnostics of a model file as JSON, with file, line and column where they are known.
-fn diagnostics(
-    found: &[Diagnostic],
-    sources: &SourceFiles,
-    spelling: &dyn RemedySpelling,
-) -> Vec<Value> {
+fn diagnostics(found: &[Diagnostic], sources: &SourceFiles, spelling: &dyn RemedySpelling) -> Vec<Value> {
     found
         .iter()
         .map(|one| {
@@ -132,13 +125,7 @@ impl ModelSummary {
     }
 
     /// Contents as lines of text, each with a name in front; lists are omitted if they are empty.
-    fn text(
-        &self,
-        name: &str,
-        derivation: &Derivation,
-        rank: Option<&SampledRank>,
-        style: TerminalStyle,
-    ) -> String {
+    fn text(&self, name: &str, derivation: &Derivation, rank: Option<&SampledRank>, style: TerminalStyle) -> String {
         let m = &derivation.mechanism;
         // The file is valid, otherwise its errors would be printed.
         let mut lines = vec![style.bold(&format!("{}: valid", plain(name)))];
@@ -171,14 +158,8 @@ impl ModelSummary {
             .map(|c| joint(c.motion, &c.name, c.passive))
             .collect();
         line("joints", format!("{}{}", joints.len(), list(&joints)));
-        line(
-            "loops",
-            format!("{}{}", self.loops.len(), list(&self.loops)),
-        );
-        line(
-            "actuators",
-            format!("{}{}", self.drives.len(), list(&drives(m, true))),
-        );
+        line("loops", format!("{}{}", self.loops.len(), list(&self.loops)));
+        line("actuators", format!("{}{}", self.drives.len(), list(&drives(m, true))));
         // Rows of the equations without a drive have force zero.
         if !self.undriven.is_empty() {
             line(
@@ -189,10 +170,7 @@ impl ModelSummary {
         // Each row of the equations belongs to one degree of freedom.
         line("degrees of freedom", m.drives.len().to_string());
         if !self.effects.is_empty() {
-            line(
-                "effects",
-                format!("{}{}", self.effects.len(), list(&self.effects)),
-            );
+            line("effects", format!("{}{}", self.effects.len(), list(&self.effects)));
         }
         line(
             "parameters",
@@ -205,25 +183,17 @@ impl ModelSummary {
             format!(
                 "{} of parameters with an effect on the drives, {} (combinations that can be identified)",
                 count(reduction.products.len(), "product", "products"),
-                count(
-                    reduction.retained.len(),
-                    "base parameter",
-                    "base parameters"
-                ),
+                count(reduction.retained.len(), "base parameter", "base parameters"),
             ),
         );
         // A reduction for one geometry only is stated, since its base is not general.
         match reduction.method {
-            ReductionMethod::Numeric { .. } => line(
-                "reduced",
-                "numerically, for the values of this file only".to_owned(),
-            ),
-            ReductionMethod::Exact {
-                at_values: true, ..
-            } => line(
-                "reduced",
-                "exactly, for the values of this file only".to_owned(),
-            ),
+            ReductionMethod::Numeric { .. } => {
+                line("reduced", "numerically, for the values of this file only".to_owned())
+            }
+            ReductionMethod::Exact { at_values: true, .. } => {
+                line("reduced", "exactly, for the values of this file only".to_owned())
+            }
             ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }
         if let Some(rank) = rank {
@@ -247,10 +217,7 @@ fn reduction(reduction: &BaseReduction) -> Value {
 /// Name of a joint, with its motion if it is not revolute, and `passive`.
 fn joint(motion: CoordinateMotion, name: &str, passive: bool) -> String {
     let unusual = (motion != CoordinateMotion::Revolute).then(|| motion.name());
-    let remarks: Vec<&str> = unusual
-        .into_iter()
-        .chain(passive.then_some("passive"))
-        .collect();
+    let remarks: Vec<&str> = unusual.into_iter().chain(passive.then_some("passive")).collect();
     if remarks.is_empty() {
         return name.to_owned();
     }

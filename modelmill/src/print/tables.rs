@@ -166,9 +166,7 @@ fn rows_of_fits(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     }
     // The comparisons are the columns.
     let heads = fits.iter().map(|(name, _)| (*name, ColumnAlignment::Right));
-    let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left))
-        .chain(heads)
-        .collect();
+    let columns: Vec<(&str, ColumnAlignment)> = std::iter::once(("", ColumnAlignment::Left)).chain(heads).collect();
     let mut lines = vec![
         String::new(),
         "  On the rows that the fit used, after low-pass and decimation:".to_owned(),
@@ -186,9 +184,7 @@ fn common_unit(figures: &ErrorFigures) -> String {
 /// Where an error is largest, one sentence for each region.
 pub fn places(places: &ErrorLocations) -> Vec<String> {
     let regions = places.regions.iter();
-    let mut lines: Vec<String> = regions
-        .map(|region| format!("  {}.", region.says))
-        .collect();
+    let mut lines: Vec<String> = regions.map(|region| format!("  {}.", region.says)).collect();
     // Errors at the level of rounding have no place that means anything.
     if !places.rounding.is_empty() {
         lines.push(format!(
@@ -197,10 +193,7 @@ pub fn places(places: &ErrorLocations) -> Vec<String> {
         ));
     }
     if lines.is_empty() {
-        lines.push(
-            "  Nowhere in particular: no range of a coordinate, rate, load or time stands out."
-                .to_owned(),
-        );
+        lines.push("  Nowhere in particular: no range of a coordinate, rate, load or time stands out.".to_owned());
     }
     lines
 }

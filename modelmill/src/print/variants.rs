@@ -5,9 +5,7 @@ use serde_json::{Value, json};
 use crate::print::{RemedySpelling, notes, tables};
 use crate::text::TerminalStyle;
 use crate::text::table::{ColumnAlignment, count, number, percent, significant, table};
-use crate::variants::{
-    DriveEffort, DriveVariants, LimitCrossing, LimitUse, TermShare, VariantComparison,
-};
+use crate::variants::{DriveEffort, DriveVariants, LimitCrossing, LimitUse, TermShare, VariantComparison};
 
 /// Terms of a drive's difference that are shown at most; the others are added up in one line.
 const MOST_TERMS: usize = 6;
@@ -103,10 +101,7 @@ impl VariantComparison {
                 });
             }
         }
-        let kept = self
-            .limits
-            .iter()
-            .filter(|l| l.crossing() == LimitCrossing::Kept);
+        let kept = self.limits.iter().filter(|l| l.crossing() == LimitCrossing::Kept);
         // Of the limits that both variants keep, only the one nearest to its end is named.
         let most = kept.clone().max_by(|a, b| {
             let used = |one: &LimitUse| one.used.into_iter().flatten().fold(0.0, f64::max);
@@ -180,11 +175,8 @@ fn drive(one: &DriveVariants) -> Value {
 /// One line of a limit: what each model uses of it.
 fn limit_line(one: &LimitUse) -> String {
     // A model without this limit has no share.
-    let used = one
-        .used
-        .map(|used| used.map_or_else(|| "no limit".to_owned(), part));
-    let range =
-        |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
+    let used = one.used.map(|used| used.map_or_else(|| "no limit".to_owned(), part));
+    let range = |m: usize| one.ranges[m].map(|[low, high]| format!("{} to {}", number(low), number(high)));
     // Equal ranges are printed once.
     let range = match (range(0), range(1)) {
         (Some(a), Some(b)) if a == b => format!(" ({a})"),
@@ -310,9 +302,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
     // Shares may be negative, where a term reduces the difference.
     let mut terms: Vec<&TermShare> = one.products.iter().flat_map(|p| &p.terms).collect();
     terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
-    let least = terms
-        .first()
-        .map_or(0.0, |first| LEAST_SHARE * first.share.abs());
+    let least = terms.first().map_or(0.0, |first| LEAST_SHARE * first.share.abs());
     let shown = terms.iter().take_while(|term| term.share.abs() >= least);
     let n = shown.take(MOST_TERMS).count();
     let rows: Vec<Vec<String>> = (terms[..n].iter())
@@ -354,11 +344,7 @@ fn shares(one: &DriveVariants) -> Vec<String> {
 fn signed_percent(share: f64) -> String {
     // A positive share has no sign.
     let size = percent(Some(share.abs()));
-    if share < 0.0 {
-        format!("-{size}")
-    } else {
-        size
-    }
+    if share < 0.0 { format!("-{size}") } else { size }
 }
 
 /// Which part of a share comes from the changed geometry (the column) instead of the changed value; empty

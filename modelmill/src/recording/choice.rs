@@ -15,8 +15,7 @@ use modelmill_boundary::message;
 use modelmill_boundary::text::{OptionName, Remedy};
 use modelmill_codegen::{ModelEvaluator, MotionStates};
 use modelmill_identify::{
-    DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote,
-    SignalRecording as Raw,
+    DECIMATION_PASSBAND, LowPass, PreparationChoices, PreparedRun, RecordingNote, SignalRecording as Raw,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -163,10 +162,7 @@ impl SmootherSearch<'_> {
         while ladder[ladder.len() - 1] / RATIO >= lowest {
             ladder.push(ladder[ladder.len() - 1] / RATIO);
         }
-        let ladder: Vec<SmootherCandidate> = ladder
-            .into_iter()
-            .map(SmootherCandidate::low_pass)
-            .collect();
+        let ladder: Vec<SmootherCandidate> = ladder.into_iter().map(SmootherCandidate::low_pass).collect();
         // The lowest cut-off loses the most samples at the ends, so that its windows exist for all candidates.
         let runs = self.runs(ladder[ladder.len() - 1])?;
         let looked_at = self.windows(&runs);
@@ -177,18 +173,13 @@ impl SmootherSearch<'_> {
         });
         let (low_pass, by_filter) = filtered.best();
         // A series must be clearly better than the low-pass to be preferred.
-        let is_better = |series: &SmootherTrials| {
-            series.best().1.figure < by_filter.figure - SMOOTHING_LEAST_GAIN
-        };
+        let is_better = |series: &SmootherTrials| series.best().1.figure < by_filter.figure - SMOOTHING_LEAST_GAIN;
         let (tried, other) = match series {
             Some(series) if is_better(&series) => {
                 let more = cost_text(by_filter.figure - series.best().1.figure);
                 (
                     series,
-                    Some(format!(
-                        "{more} by a low-pass at {}",
-                        low_pass.frequency_text()
-                    )),
+                    Some(format!("{more} by a low-pass at {}", low_pass.frequency_text())),
                 )
             }
             Some(series) => {
@@ -196,10 +187,7 @@ impl SmootherSearch<'_> {
                 let more = cost_text(left.figure - by_filter.figure);
                 (
                     filtered,
-                    Some(format!(
-                        "{more} by a Fourier series of {}",
-                        smoother.frequency_text()
-                    )),
+                    Some(format!("{more} by a Fourier series of {}", smoother.frequency_text())),
                 )
             }
             None => (filtered, None),
@@ -235,11 +223,7 @@ impl SmootherSearch<'_> {
     }
 
     /// Tests smoothers in the order of decreasing bandwidth, until the residual is clearly too large.
-    fn try_smoothers(
-        &self,
-        ladder: &[SmootherCandidate],
-        looked_at: &[TimeWindow],
-    ) -> Option<SmootherTrials> {
+    fn try_smoothers(&self, ladder: &[SmootherCandidate], looked_at: &[TimeWindow]) -> Option<SmootherTrials> {
         let mut all: Vec<(SmootherCandidate, HeldOutResidual)> = Vec::new();
         let mut least = f64::INFINITY;
         for smoother in ladder {
@@ -253,19 +237,13 @@ impl SmootherSearch<'_> {
             }
         }
         // Of all that are nearly as good, the last one smooths most.
-        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| {
-            left.figure <= least + SMOOTHING_LEAST_GAIN
-        };
+        let is_good = |(_, left): &(SmootherCandidate, HeldOutResidual)| left.figure <= least + SMOOTHING_LEAST_GAIN;
         let best = all.iter().rposition(is_good)?;
         Some(SmootherTrials { all, best })
     }
 
     /// The factor of decimation, with the residual on held-out parts; `None` if it cannot be evaluated.
-    fn decimation(
-        &self,
-        smoother: SmootherCandidate,
-        looked_at: &[TimeWindow],
-    ) -> Option<(usize, HeldOutResidual)> {
+    fn decimation(&self, smoother: SmootherCandidate, looked_at: &[TimeWindow]) -> Option<(usize, HeldOutResidual)> {
         let mut best: Option<(usize, HeldOutResidual)> = None;
         // Passbands increase, so that the strongest decimation is tested first.
         for part in PARALLEL {
@@ -353,8 +331,7 @@ impl SmootherSearch<'_> {
             .iter()
             .map(|window| {
                 let run = runs.iter().find(|run| {
-                    run.time[0] <= window.from + slack
-                        && run.time[run.time.len() - 1] >= window.to - slack
+                    run.time[0] <= window.from + slack && run.time[run.time.len() - 1] >= window.to - slack
                 })?;
                 self.samples(run, window, every)
             })
@@ -409,12 +386,8 @@ impl SmootherSearch<'_> {
                 // Differences of successive low-passes are the octaves.
                 let mut below: [Option<Vec<f64>>; 2] = [None, None];
                 for (octave, edge) in octaves.iter_mut().zip(&edges) {
-                    let passed = LowPass::butterworth(4, *edge, rate).and_then(|low_pass| {
-                        Ok([
-                            low_pass.zero_phase(&measured)?,
-                            low_pass.zero_phase(&model)?,
-                        ])
-                    });
+                    let passed = LowPass::butterworth(4, *edge, rate)
+                        .and_then(|low_pass| Ok([low_pass.zero_phase(&measured)?, low_pass.zero_phase(&model)?]));
                     // A part that is too short to be filtered is skipped.
                     let Ok(passed) = passed else { continue };
                     let [y, m] = [0, 1].map(|k| match &below[k] {
@@ -435,10 +408,7 @@ impl SmootherSearch<'_> {
                 return None;
             }
             let rounding = ROUNDING * ROUNDING * size;
-            let above: f64 = octaves[1..]
-                .iter()
-                .map(|octave| octave.residual_power(true))
-                .sum();
+            let above: f64 = octaves[1..].iter().map(|octave| octave.residual_power(true)).sum();
             let within = octaves[0].residual_power(false).max(rounding);
             figure += 0.5 * (within + above).ln();
             relative += 0.5 * (within / size).ln();
@@ -451,12 +421,7 @@ impl SmootherSearch<'_> {
     }
 
     /// Regressor and forces at every `every`-th sample of a window; `None` if there are too few samples.
-    fn samples(
-        &self,
-        run: &PreparedRun,
-        window: &TimeWindow,
-        every: usize,
-    ) -> Option<WindowSamples> {
+    fn samples(&self, run: &PreparedRun, window: &TimeWindow, every: usize) -> Option<WindowSamples> {
         let forces = run.force.as_deref()?;
         let start = run.time.partition_point(|t| *t < window.from);
         let end = run.time.partition_point(|t| *t <= window.to);
@@ -686,8 +651,7 @@ fn fit_folds(folds: &[FoldSums]) -> Option<Vec<DVector<f64>>> {
             let found = solve_scaled(&normal, &right)?;
             // The sum of squares of the residual follows from the sums of the fold.
             for (left, one) in left.iter_mut().zip(&judged.drives) {
-                let explained =
-                    2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
+                let explained = 2.0 * one.right.dot(&found) - (symmetric(&one.normal) * &found).dot(&found);
                 *left += (one.size - explained).max(0.0);
             }
             values.push(found);

@@ -68,8 +68,7 @@ pub(crate) fn read_options(
             Ok(sum) if mapping.is_conflicting(&sum) => {}
             Ok(sum) => mapping.add(ours, sum),
             // A recording may use the names of the model, or lack optional columns.
-            Err(ColumnFault::Missing { .. })
-                if header.contains(ours) || is_optional(ours, quantity) => {}
+            Err(ColumnFault::Missing { .. }) if header.contains(ours) || is_optional(ours, quantity) => {}
             Err(fault) => {
                 faults.push(Error::input(message!(
                     "{file}: the model file takes `{ours}` from `{text}`, but {fault} {} \
@@ -119,9 +118,7 @@ fn combined_error(mut faults: Vec<Error>) -> Option<Error> {
     if faults.len() < 2 {
         return faults.pop();
     }
-    let is_wrong_option = faults
-        .iter()
-        .any(|fault| matches!(fault, Error::Options(_)));
+    let is_wrong_option = faults.iter().any(|fault| matches!(fault, Error::Options(_)));
     // A single fault is returned as it is.
     let lines = faults.iter().map(|fault| message!("- {}", fault.message()));
     let says = message!(
@@ -185,11 +182,7 @@ impl ColumnMapping {
 
     /// Whether the user has assigned the only column of a sum to another name.
     fn is_conflicting(&self, sum: &ColumnSum) -> bool {
-        sum.terms.len() == 1
-            && self
-                .renames
-                .iter()
-                .any(|(_, theirs)| *theirs == sum.terms[0].0)
+        sum.terms.len() == 1 && self.renames.iter().any(|(_, theirs)| *theirs == sum.terms[0].0)
     }
 }
 
@@ -216,9 +209,7 @@ fn quantity_of(known: &[(String, ColumnQuantity)], ours: &str) -> Option<ColumnQ
 fn is_optional(ours: &str, quantity: ColumnQuantity) -> bool {
     match quantity {
         ColumnQuantity::Time | ColumnQuantity::Number => false,
-        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => {
-            order > 0 && ours.contains("_d")
-        }
+        ColumnQuantity::Angle(order) | ColumnQuantity::Length(order) => order > 0 && ours.contains("_d"),
         _ => true,
     }
 }
@@ -247,11 +238,7 @@ fn map(ours: &str, theirs: &str) -> Remedy {
 /// The columns of the recording as text, at most 40 of them.
 fn column_list_text(header: &[String]) -> String {
     // Long lists are cut off, with their number.
-    let shown: Vec<String> = header
-        .iter()
-        .take(40)
-        .map(|name| format!("`{name}`"))
-        .collect();
+    let shown: Vec<String> = header.iter().take(40).map(|name| format!("`{name}`")).collect();
     let more = if header.len() > 40 {
         format!(" and {} more", header.len() - 40)
     } else {

@@ -26,9 +26,7 @@ impl Host {
         // A model, rig or fit file is named as such, since it is often given by mistake.
         if let Some(kind) = kinds_of_files::file_kind(self, path.as_ref()) {
             let path = path.as_ref().display();
-            return Err(Error::input(format!(
-                "{path} is {kind}; a recording is expected"
-            )));
+            return Err(Error::input(format!("{path} is {kind}; a recording is expected")));
         }
         let file = RecordingFile::open(self.files(), path.as_ref())?;
         let tables = self.run_job(&format!("reading {}", file.name()), 0, |_| file.tables())??;

@@ -27,9 +27,7 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
     let mechanism = &model.derivation.mechanism;
     // Free bodies first: their poses are needed for the forces.
     for body in free_bodies(mechanism) {
-        let names = body
-            .quaternion
-            .map(|i| mechanism.coordinates[i.0].name.as_str());
+        let names = body.quaternion.map(|i| mechanism.coordinates[i.0].name.as_str());
         // Missing columns are reported when states are prepared.
         if names.iter().all(|name| raw.has_column(name)) {
             normalise_quaternions(raw, names)?;
@@ -60,18 +58,13 @@ pub(super) fn complete(model: &Model, raw: &mut Raw) -> Outcome<Vec<RecordingNot
 fn add_shared_drive_forces(mechanism: &Mechanism, raw: &mut Raw) -> Outcome {
     let shared = &mechanism.shared_drives;
     let has = |name: &str| raw.has_column(name);
-    if !shared.iter().any(|drive| has(&drive.name))
-        || !mechanism.coordinates.iter().all(|c| has(&c.name))
-    {
+    if !shared.iter().any(|drive| has(&drive.name)) || !mechanism.coordinates.iter().all(|c| has(&c.name)) {
         // No forces were measured, or poses are missing, which is reported when states are prepared.
         return Ok(());
     }
     // The pose of every sample determines the Jacobian of the drives.
     let column = |name: &str| raw.column(name).map(<[f64]>::to_vec);
-    let forces: Vec<Vec<f64>> = shared
-        .iter()
-        .map(|d| column(&d.name))
-        .collect::<Result<_, _>>()?;
+    let forces: Vec<Vec<f64>> = shared.iter().map(|d| column(&d.name)).collect::<Result<_, _>>()?;
     let q: Vec<Vec<f64>> = mechanism
         .coordinates
         .iter()
@@ -131,11 +124,7 @@ fn normalise_quaternions(raw: &mut Raw, names: [&str; 4]) -> Outcome {
         }
         // q and -q are the same orientation; the sign follows the sample before.
         let side: f64 = here.iter().zip(&last).map(|(a, b)| a * b).sum();
-        let scale = if side < 0.0 {
-            -1.0 / length
-        } else {
-            1.0 / length
-        };
+        let scale = if side < 0.0 { -1.0 / length } else { 1.0 / length };
         for (k, column) in columns.iter_mut().enumerate() {
             column[sample] *= scale;
             last[k] = column[sample];
@@ -187,11 +176,7 @@ fn twist_halves(body: &FreeBody) -> [[usize; 3]; 2] {
 }
 
 /// The prepared runs of a recording, in which the rates of free bodies are their twist.
-pub(super) fn runs(
-    model: &Model,
-    raw: &Raw,
-    preparation: &StatePreparation,
-) -> Outcome<Vec<PreparedRun>> {
+pub(super) fn runs(model: &Model, raw: &Raw, preparation: &StatePreparation) -> Outcome<Vec<PreparedRun>> {
     let mechanism = &model.derivation.mechanism;
     // The preparation treats the pose like any other coordinates.
     let mut runs = raw.runs_with(&model.active_coordinates(), &model.drives(), preparation)?;
@@ -222,22 +207,14 @@ fn set_twist(mechanism: &Mechanism, body: &FreeBody, run: &mut PreparedRun, reco
         let q = quaternion.map(|i| of(&run.q, i));
         // The orientation converts between the axes of body and base.
         let turn = BodyRotation::new(q);
-        let (mut omega, mut alpha) = (
-            vector.map(|i| of(&run.qd, i)),
-            vector.map(|i| of(&run.qdd, i)),
-        );
+        let (mut omega, mut alpha) = (vector.map(|i| of(&run.qd, i)), vector.map(|i| of(&run.qdd, i)));
         // Angular velocity and acceleration from the quaternion.
         if !recorded[1] {
             // q' = q w / 2 in body axes, w' likewise; a change of the length of q is removed.
             let square: f64 = q.iter().map(|x| x * x).sum();
-            let [first, second] = [&run.qd, &run.qdd].map(|of_order| {
-                imaginary(q, quaternion.map(|i| of(of_order, i))).map(|x| 2.0 * x / square)
-            });
-            let growth: f64 = quaternion
-                .iter()
-                .zip(q)
-                .map(|(i, x)| of(&run.qd, *i) * x)
-                .sum();
+            let [first, second] = [&run.qd, &run.qdd]
+                .map(|of_order| imaginary(q, quaternion.map(|i| of(of_order, i))).map(|x| 2.0 * x / square));
+            let growth: f64 = quaternion.iter().zip(q).map(|(i, x)| of(&run.qd, *i) * x).sum();
             let shrink = 2.0 * growth / square;
             omega = first;
             alpha = std::array::from_fn(|k| second[k] - shrink * first[k]);
@@ -246,10 +223,7 @@ fn set_twist(mechanism: &Mechanism, body: &FreeBody, run: &mut PreparedRun, reco
             }
         }
         // Velocities in body axes: the derivative in a rotating frame subtracts omega x v.
-        let (mut velocity, mut acceleration) = (
-            position.map(|i| of(&run.qd, i)),
-            position.map(|i| of(&run.qdd, i)),
-        );
+        let (mut velocity, mut acceleration) = (position.map(|i| of(&run.qd, i)), position.map(|i| of(&run.qdd, i)));
         if !recorded[0] && body.linear == TwistAxes::Body {
             let omega = match body.angular {
                 TwistAxes::Body => omega,

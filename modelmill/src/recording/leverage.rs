@@ -59,9 +59,7 @@ impl<'a> DriveLeverage<'a> {
             qdd: slices(&one),
             load: slices(&load),
         };
-        let rows = ModelEvaluator::new(&self.model.derivation)
-            .regressor(&states)
-            .ok()?;
+        let rows = ModelEvaluator::new(&self.model.derivation).regressor(&states).ok()?;
         let size = rows.row(drive).norm();
         size.is_finite().then_some(size)
     }

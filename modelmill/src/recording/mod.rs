@@ -23,7 +23,7 @@ use crate::audit;
 use crate::error::{Error, Outcome};
 use crate::host::kinds_of_files;
 use crate::model::Model;
-use crate::stretch::{RecordingSegment, variances};
+use crate::segment::{RecordingSegment, variances};
 use crate::text::table::significant;
 
 use columns::read_options;
@@ -60,11 +60,7 @@ fn read_raw(model: &Model, file: &RecordingFiles, reading: &RecordingOptions) ->
 
 /// The prepared segments of a recording. If the model has a delay of the force signal, each force gets the states of
 /// the time at which it acted.
-fn prepare_segments(
-    model: &Model,
-    raw: &Raw,
-    reading: &RecordingOptions,
-) -> Outcome<Vec<RecordingSegment>> {
+fn prepare_segments(model: &Model, raw: &Raw, reading: &RecordingOptions) -> Outcome<Vec<RecordingSegment>> {
     // The delay is a property of the model, not of the file.
     let delay = model.derivation.mechanism.force_delay;
     let mut data = prepare(model, raw, reading, delay)?;
@@ -107,9 +103,9 @@ fn resolve_reading(
     reading: &RecordingOptions,
 ) -> Outcome<(RecordingOptions, Option<RecordingNote>)> {
     let says = format!("choosing how {} is smoothed", raw.file());
-    let chosen = model.host().run_job(&says, 0, |_| {
-        choice::choose_preparation(model, raw, reading)
-    })??;
+    let chosen = model
+        .host()
+        .run_job(&says, 0, |_| choice::choose_preparation(model, raw, reading))??;
     Ok(match chosen {
         Some((reading, note)) => (reading, Some(note)),
         None => (reading.clone(), None),
@@ -131,11 +127,7 @@ fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
         )));
     };
     // A delay loses samples at the start, a lead at the end.
-    let (side, lost) = if start > 0 {
-        ("first", start)
-    } else {
-        ("last", end)
-    };
+    let (side, lost) = if start > 0 { ("first", start) } else { ("last", end) };
     let lost = match lost {
         0 => String::new(),
         1 => format!("; the {side} sample has no states and is left out"),
@@ -150,20 +142,14 @@ fn compensate_delay(run: &mut PreparedRun, delay: f64) -> Outcome {
 
 /// Prepares all segments of a recording: states, notes on suspicious signals, delay, variances and
 /// disturbances.
-fn prepare(
-    model: &Model,
-    recording: &Raw,
-    args: &RecordingOptions,
-    delay: f64,
-) -> Outcome<Vec<RecordingSegment>> {
+fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) -> Outcome<Vec<RecordingSegment>> {
     let preparation = &args.preparation;
     // States are prepared for each segment between gaps.
-    let mut runs =
-        model
-            .host()
-            .run_job(&format!("preparing {}", recording.file()), 0, |_| {
-                free::runs(model, recording, preparation)
-            })??;
+    let mut runs = model
+        .host()
+        .run_job(&format!("preparing {}", recording.file()), 0, |_| {
+            free::runs(model, recording, preparation)
+        })??;
     let is_examined = !preparation.unexamined;
     // Notes on the recording are added to its first segment.
     if let Some(first) = runs.first_mut().filter(|_| is_examined) {
@@ -194,11 +180,9 @@ fn prepare(
     }
     // Faults of positions count as disturbances of every segment.
     let faults: Vec<Disturbance> = if is_examined {
-        (recording
-            .position_faults(&model.active_coordinates())
-            .into_iter())
-        .map(|fault| position_fault(model, recording.file(), &fault))
-        .collect()
+        (recording.position_faults(&model.active_coordinates()).into_iter())
+            .map(|fault| position_fault(model, recording.file(), &fault))
+            .collect()
     } else {
         Vec::new()
     };
@@ -291,11 +275,7 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
 
 /// Warns about recordings that are given twice, also as copies: they have double weight, or make a validation run
 /// useless.
-pub fn note_duplicates(
-    model: &Model,
-    data: &mut [RecordingSegment],
-    check: &mut [RecordingSegment],
-) {
+pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut [RecordingSegment]) {
     // A recording is compared with all earlier ones.
     for k in 1..data.len() {
         let (before, rest) = data.split_at_mut(k);
@@ -352,21 +332,13 @@ impl Model {
     /// }
     /// # Ok::<(), modelmill::Error>(())
     /// ```
-    pub fn recording(
-        &self,
-        path: impl AsRef<Path>,
-        reading: &RecordingOptions,
-    ) -> Outcome<PreparedRecording> {
+    pub fn recording(&self, path: impl AsRef<Path>, reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         self.recording_of(&[path.as_ref()], reading)
     }
 
     /// As [`Model::recording`], for several files of one run, whose columns are joined on time: the slowest file sets
     /// the sample times, and the others are interpolated to them.
-    pub fn recording_of(
-        &self,
-        paths: &[&Path],
-        reading: &RecordingOptions,
-    ) -> Outcome<PreparedRecording> {
+    pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
             .map_err(Error::from)
@@ -493,11 +465,8 @@ pub(crate) fn segments(
     fit: &[&PreparedRecording],
     check: &[&PreparedRecording],
 ) -> [Vec<RecordingSegment>; 2] {
-    let [mut fit, mut check] = [fit, check].map(|all| {
-        all.iter()
-            .flat_map(|one| one.segments.clone())
-            .collect::<Vec<_>>()
-    });
+    let [mut fit, mut check] =
+        [fit, check].map(|all| all.iter().flat_map(|one| one.segments.clone()).collect::<Vec<_>>());
     note_duplicates(model, &mut fit, &mut check);
     [fit, check]
 }

@@ -21,10 +21,7 @@ pub(super) struct SmootherCandidate {
 impl SmootherCandidate {
     /// A low-pass with a cut-off frequency, Hz.
     pub(super) fn low_pass(cutoff: f64) -> Self {
-        Self {
-            cutoff,
-            period: None,
-        }
+        Self { cutoff, period: None }
     }
 
     /// A Fourier series with a period, s, and a number of harmonics.
@@ -45,9 +42,7 @@ impl SmootherCandidate {
     pub(super) fn apply_to(self, preparation: &mut StatePreparation) {
         preparation.cutoff_hz = Some(self.cutoff);
         if self.period.is_some() {
-            preparation.smoothing = SmoothingMethod::Fourier {
-                period: self.period,
-            };
+            preparation.smoothing = SmoothingMethod::Fourier { period: self.period };
         }
     }
 

@@ -57,11 +57,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
         let run = &before.runs[*k];
         let title = format!(
             "{} {}",
-            if run.is_check {
-                "Validation run"
-            } else {
-                "Fitted run"
-            },
+            if run.is_check { "Validation run" } else { "Fitted run" },
             run.name
         );
         let open = if place == 0 { " open" } else { "" };
@@ -85,13 +81,7 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
 }
 
 /// All panels of one recording, and their numbers as JSON for the script. `most` bounds the values of a curve.
-fn run_panels(
-    before: &ModelVersion,
-    after: Option<&ModelVersion>,
-    names: [&str; 2],
-    k: usize,
-    most: usize,
-) -> String {
+fn run_panels(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str; 2], k: usize, most: usize) -> String {
     let mut html = String::new();
     let mut packed = Vec::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
@@ -107,10 +97,7 @@ fn run_panels(
     // Text of a script must not contain `</`, which would end it.
     let text = json!({ "panels": packed }).to_string();
     let text = text.replace('<', "\\u003c");
-    let _ = writeln!(
-        html,
-        "<script type=\"application/json\" id=\"run{k}\">{text}</script>"
-    );
+    let _ = writeln!(html, "<script type=\"application/json\" id=\"run{k}\">{text}</script>");
     html
 }
 

@@ -104,21 +104,10 @@ impl PlotAxis {
         let decades = (self.to / self.from).log10();
         let mut ticks = Vec::new();
         // Up to two decades have room for steps of 1, 2 and 5.
-        let steps: &[f64] = if decades <= 2.0 {
-            &[1.0, 2.0, 5.0]
-        } else {
-            &[1.0]
-        };
+        let steps: &[f64] = if decades <= 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
         #[expect(clippy::cast_possible_truncation, reason = "exponents of ten")]
-        let (low, high) = (
-            self.from.log10().floor() as i32,
-            self.to.log10().ceil() as i32,
-        );
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a few decades"
-        )]
+        let (low, high) = (self.from.log10().floor() as i32, self.to.log10().ceil() as i32);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decades")]
         let every = ((decades / most.max(1) as f64).ceil() as usize).max(1);
         for exponent in (low..=high).step_by(every) {
             for step in steps {
@@ -153,11 +142,7 @@ fn label(value: f64, step: f64) -> String {
         let text = format!("{value:.1e}");
         return text.replace(".0e", "e");
     }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a few decimals"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few decimals")]
     let decimals = (-(step.abs() * 1.001).log10().floor()).max(0.0) as usize;
     format!("{value:.decimals$}").replace('-', "−")
 }
@@ -276,13 +261,7 @@ pub(crate) fn attribute(text: &str) -> String {
 
 /// The path of a curve, thinned out to `points` points; values that are not finite are gaps. `span` are the values
 /// of `x` at both ends.
-pub(crate) fn line(
-    values: &[f64],
-    x: &PlotAxis,
-    span: [f64; 2],
-    y: &PlotAxis,
-    points: usize,
-) -> String {
+pub(crate) fn line(values: &[f64], x: &PlotAxis, span: [f64; 2], y: &PlotAxis, points: usize) -> String {
     let last = values.len().max(2) - 1;
     let mut d = String::new();
     let mut pen = 'M';
@@ -339,10 +318,7 @@ mod tests {
     fn odd_ranges_do_no_harm() {
         for range in [[0.0, 0.0], [f64::NAN, 1.0], [5.0, 5.0], [1e300, -1e300]] {
             let axis = PlotAxis::new(range, [0.0, 100.0]);
-            assert!(
-                axis.position(0.0).is_finite() && axis.ticks(5).len() < 20,
-                "{range:?}"
-            );
+            assert!(axis.position(0.0).is_finite() && axis.ticks(5).len() < 20, "{range:?}");
         }
     }
 }

@@ -47,11 +47,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
         let at = x.position(100.0 * noise);
         picture.path("noise", &format!("M{at:.1} {TOP:.1}V{bottom:.1}"));
         // The label stays inside of the picture on either half of the axis.
-        let anchor = if at > 0.5 * (x.start + x.end) {
-            "end"
-        } else {
-            "start"
-        };
+        let anchor = if at > 0.5 * (x.start + x.end) { "end" } else { "start" };
         let aside = if anchor == "end" { -5.0 } else { 5.0 };
         picture.text(
             "tick",
@@ -73,11 +69,7 @@ pub(crate) fn picture(ladder: &[SelectionStep], noise: f64, judged: ValidationMe
             );
             picture.path(
                 "rung c-after",
-                &format!(
-                    "M{check_before:.1} {:.1}L{check:.1} {:.1}",
-                    before + 14.0,
-                    middle + 7.0
-                ),
+                &format!("M{check_before:.1} {:.1}L{check:.1} {:.1}", before + 14.0, middle + 7.0),
             );
         }
         picture.dot("dot c-fit", [fit, middle - 7.0], 5.0);

@@ -112,11 +112,7 @@ fn pairs(variables: &[MapVariable]) -> Vec<(usize, usize)> {
 }
 
 /// A figure for each drive, with maps before and after the effects.
-pub(crate) fn figures(
-    before: &ModelVersion,
-    after: Option<&ModelVersion>,
-    variables: &[MapVariable],
-) -> String {
+pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, variables: &[MapVariable]) -> String {
     let judged = before.validation_runs();
     let mut html = String::new();
     for (d, drive) in before.model.drives().iter().enumerate() {
@@ -174,12 +170,7 @@ pub(crate) fn figures(
 
 /// Maps side by side with one scale of shades; `names` are the variables across and upwards, `unit` is that of
 /// the error.
-fn picture(
-    maps: &[(&str, Vec<Option<f64>>)],
-    grid: &ErrorGrid,
-    names: &[String; 2],
-    unit: &str,
-) -> String {
+fn picture(maps: &[(&str, Vec<Option<f64>>)], grid: &ErrorGrid, names: &[String; 2], unit: &str) -> String {
     let (width, height, top) = (330.0, 190.0, 30.0);
     // Both maps use the scale of the larger error.
     let largest = maps
@@ -198,11 +189,7 @@ fn picture(
         // Cells of one shade are one path, so that the file stays small.
         for (cell, size) in map.iter().enumerate() {
             let Some(size) = size else { continue };
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "a shade"
-            )]
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a shade")]
             let shade = (size / largest.max(f64::MIN_POSITIVE) * SHADES as f64) as usize;
             let (column, row) = (cell % COLUMNS, cell / COLUMNS);
             let _ = write!(
@@ -221,11 +208,7 @@ fn picture(
     let foot = top + height + 48.0;
     for shade in 0..SHADES {
         let at = 62.0 + 16.0 * shade as f64;
-        picture.rect(
-            &format!("heat h{shade}"),
-            [at, foot],
-            [at + 16.0, foot + 10.0],
-        );
+        picture.rect(&format!("heat h{shade}"), [at, foot], [at + 16.0, foot + 10.0]);
     }
     let right = 62.0 + 16.0 * SHADES as f64 + 8.0;
     picture.text(
@@ -255,12 +238,8 @@ mod tests {
             .zip(&rate)
             .map(|(q, v)| if *q > 0.5 && *v < 0.0 { 3.0 } else { 0.1 })
             .collect();
-        let right = ErrorGrid::new(&q, &rate)
-            .unwrap()
-            .error_concentration(&error);
-        let wrong = ErrorGrid::new(&other, &rate)
-            .unwrap()
-            .error_concentration(&error);
+        let right = ErrorGrid::new(&q, &rate).unwrap().error_concentration(&error);
+        let wrong = ErrorGrid::new(&other, &rate).unwrap().error_concentration(&error);
         assert!(right > 0.8 && wrong < 0.5 * right, "{right} {wrong}");
         assert!(ErrorGrid::new(&q, &vec![1.0; q.len()]).is_none());
     }

@@ -11,7 +11,7 @@ use modelmill_identify::diagnose::DiagnosisVerdict;
 use super::{DiagnosisFindings, curves, ladder, legend, maps, regions, spectrum, tables, words};
 use crate::compare::ErrorLocations;
 use crate::error::Outcome;
-use crate::print::{StepSpelling, laws as told};
+use crate::print::{StepSpelling, laws as law_texts};
 use crate::text::svg::escape;
 use crate::text::table::percent;
 
@@ -27,21 +27,13 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
     let mut page = pages::begin(&title);
     // The sections in the order in which a user needs them, each with its id and title.
     let sections = [
-        (
-            "ladder",
-            "Error after each added effect",
-            ladder_section(findings),
-        ),
+        ("ladder", "Error after each added effect", ladder_section(findings)),
         (
             "found",
             "Missing effects and next steps",
             missing_section(findings, spelling),
         ),
-        (
-            "curves",
-            "Measured and calculated forces",
-            curves_section(findings),
-        ),
+        ("curves", "Measured and calculated forces", curves_section(findings)),
         ("where", "Where the error is largest", location(findings)),
         (
             "frequency",
@@ -55,11 +47,7 @@ pub fn page(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> Outcom
             "Recordings and their preparation",
             tables::data(findings, spelling),
         ),
-        (
-            "equations",
-            "Equations",
-            embed_equations(findings, &equations),
-        ),
+        ("equations", "Equations", embed_equations(findings, &equations)),
     ];
     // Links to all sections at the top of the page.
     page.push_str("<nav>");
@@ -99,9 +87,7 @@ pub fn scripts() -> impl Iterator<Item = &'static str> {
 /// Text between two marks; empty if they are missing.
 pub(super) fn text_between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
     // The first occurrence of each mark counts.
-    let inner = text
-        .split_once(from)
-        .and_then(|(_, rest)| rest.split_once(to));
+    let inner = text.split_once(from).and_then(|(_, rest)| rest.split_once(to));
     inner.map_or("", |(inner, _)| inner)
 }
 
@@ -115,11 +101,7 @@ fn summary(findings: &DiagnosisFindings) -> String {
         DiagnosisVerdict::Unexplained => ("unexplained", "error is not explained"),
     };
     // The same sentences as in the text output.
-    let says = words::verdict(
-        diagnosis,
-        &findings.before.model.drives(),
-        findings.validation,
-    );
+    let says = words::verdict(diagnosis, &findings.before.model.drives(), findings.validation);
     // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
@@ -175,7 +157,7 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
     let model = &findings.before.model;
     let mut html = format!(
         "<h3>Laws that would explain the residual</h3>\n<p>{}</p>\n",
-        escape(told::HYPOTHESIS)
+        escape(law_texts::HYPOTHESIS)
     );
     for hypothesis in &findings.laws {
         // Each law with its values, the share that it explains, and its alternatives.
@@ -184,8 +166,8 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
             html,
             "<p><code>{}</code> with {}: it {}</p>",
             escape(&law.label()),
-            escape(&told::values(law)),
-            escape(&told::gain(law))
+            escape(&law_texts::values(law)),
+            escape(&law_texts::gain(law))
         );
         // Alternatives that the recordings do not distinguish.
         if !hypothesis.near_ties.is_empty() {
@@ -198,18 +180,18 @@ fn laws(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String {
         // A law without memory can be added from a library file.
         match &law.entry {
             Some(entry) => {
-                let command = spelling.spell_effect_of_library(model, &entry.effect, told::LIBRARY);
+                let command = spelling.spell_effect_of_library(model, &entry.effect, law_texts::LIBRARY);
                 let _ = writeln!(
                     html,
                     "<p>As a library file, <code>{}</code>, and the step that adds it:</p>\n<pre class=\"commands\"><code>{}</code></pre>\n\
                      <pre class=\"commands\"><code>{}</code></pre>",
-                    told::LIBRARY,
+                    law_texts::LIBRARY,
                     escape(&entry.text),
                     escape(&command)
                 );
             }
             None => {
-                let _ = writeln!(html, "<p>{}</p>", escape(told::PATH_DEPENDENT_NOTE));
+                let _ = writeln!(html, "<p>{}</p>", escape(law_texts::PATH_DEPENDENT_NOTE));
             }
         }
     }
@@ -277,10 +259,7 @@ fn location(findings: &DiagnosisFindings) -> String {
     // Both models are shown if the second one could be built.
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
-    html.push_str(&sentences(
-        &findings.places,
-        "The error of the model as it is",
-    ));
+    html.push_str(&sentences(&findings.places, "The error of the model as it is"));
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,

@@ -93,18 +93,8 @@ fn picture(
     let judged = before.validation_runs();
     // A segment of time belongs to one recording, which its sentence names if there are several.
     let runs: Vec<usize> = if region.variable == TIME_COLUMN {
-        let named = |k: &usize| {
-            region
-                .says
-                .starts_with(&format!("{}: ", before.runs[*k].name))
-        };
-        vec![
-            judged
-                .iter()
-                .copied()
-                .find(named)
-                .unwrap_or(*judged.first()?),
-        ]
+        let named = |k: &usize| region.says.starts_with(&format!("{}: ", before.runs[*k].name));
+        vec![judged.iter().copied().find(named).unwrap_or(*judged.first()?)]
     } else {
         judged
     };
@@ -112,9 +102,7 @@ fn picture(
     let over: Vec<f64> = if region.variable == TIME_COLUMN {
         before.runs[*runs.first()?].time.clone()
     } else {
-        let (_, values) = variables
-            .iter()
-            .find(|(name, _)| *name == region.variable)?;
+        let (_, values) = variables.iter().find(|(name, _)| *name == region.variable)?;
         values.clone()
     };
     // Errors before and after the effects.
@@ -131,10 +119,7 @@ fn picture(
     // The axis upwards covers mean and standard deviation of all curves.
     let bounds: Vec<f64> = bins
         .iter()
-        .flat_map(|(_, bins)| {
-            bins.iter()
-                .flat_map(|b| [b.mean - b.spread, b.mean + b.spread])
-        })
+        .flat_map(|(_, bins)| bins.iter().flat_map(|b| [b.mean - b.spread, b.mean + b.spread]))
         .collect();
     if bounds.is_empty() {
         return None;
@@ -162,11 +147,7 @@ fn picture(
             let at = x.position(bin.at);
             let pen = if k == 0 { 'M' } else { 'L' };
             let _ = write!(mean, "{pen}{at:.1} {:.1}", y.position(bin.mean));
-            let _ = write!(
-                upper,
-                "{pen}{at:.1} {:.1}",
-                y.position(bin.mean + bin.spread)
-            );
+            let _ = write!(upper, "{pen}{at:.1} {:.1}", y.position(bin.mean + bin.spread));
             lower = format!("L{at:.1} {:.1}{lower}", y.position(bin.mean - bin.spread));
         }
         picture.path(&format!("band {class}"), &format!("{upper}{lower}Z"));
@@ -194,16 +175,8 @@ fn bin_errors(over: &[f64], error: &[f64]) -> Vec<ErrorBin> {
     }
     // Number, sum and sum of squares of the error in each segment.
     let mut sums = vec![(0.0, 0.0, 0.0); BINS];
-    for (v, e) in over
-        .iter()
-        .zip(error)
-        .filter(|(v, e)| v.is_finite() && e.is_finite())
-    {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a bin"
-        )]
+    for (v, e) in over.iter().zip(error).filter(|(v, e)| v.is_finite() && e.is_finite()) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bin")]
         let k = ((v - low) / (high - low) * BINS as f64) as usize;
         let sum = &mut sums[k.min(BINS - 1)];
         *sum = (sum.0 + 1.0, sum.1 + e, sum.2 + e * e);

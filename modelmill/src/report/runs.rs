@@ -28,27 +28,16 @@ pub fn runs_page(compared: &RunsComparison, spelling: &dyn RemedySpelling) -> St
     // The sections in the order in which a user needs them, each with its id and title.
     let mut sections = vec![
         ("when", "Lasting changes", points(compared)),
-        (
-            "against",
-            "Each run compared with the first",
-            changes_table(compared),
-        ),
+        ("against", "Each run compared with the first", changes_table(compared)),
     ];
     // The joint fit exists only if it was requested.
     if let Some(shared) = &compared.shared {
         sections.push(("own", "Joint fit of all runs", shared_fit_section(shared)));
     }
-    sections.push((
-        "parameters",
-        "Base parameters over the runs",
-        parameters(compared),
-    ));
+    sections.push(("parameters", "Base parameters over the runs", parameters(compared)));
     sections.push(("runs", "The runs", runs(compared, spelling)));
     for (id, title, html) in sections {
-        let _ = write!(
-            page,
-            "<section id=\"runs-{id}\">\n<h2>{title}</h2>\n{html}</section>\n"
-        );
+        let _ = write!(page, "<section id=\"runs-{id}\">\n<h2>{title}</h2>\n{html}</section>\n");
     }
     page.push_str(&end());
     page
@@ -87,10 +76,7 @@ fn changes_list(changes: &[RunChange]) -> String {
         let _ = write!(html, "<li>{}", escape(&one.says));
         if !one.rivals.is_empty() {
             let rivals = escape(&one.rivals.join("; "));
-            let _ = write!(
-                html,
-                "<br><small>not distinguishable from: {rivals}</small>"
-            );
+            let _ = write!(html, "<br><small>not distinguishable from: {rivals}</small>");
         }
         html.push_str("</li>\n");
     }
@@ -173,14 +159,11 @@ fn changes_table(compared: &RunsComparison) -> String {
 
 /// Values that each run has for itself in the joint fit.
 fn shared_fit_section(shared: &SharedFit) -> String {
-    let mut html = String::from(
-        "<p>All runs share their base parameters. The values below belong to one run each.</p>\n",
-    );
+    let mut html =
+        String::from("<p>All runs share their base parameters. The values below belong to one run each.</p>\n");
     // Factors of force signals exist only with a known load.
     if !shared.gains.is_empty() {
-        html.push_str(
-            "<p>True force = factor times measured force, determined by the known load.</p>\n",
-        );
+        html.push_str("<p>True force = factor times measured force, determined by the known load.</p>\n");
         let rows: Vec<Vec<TableCell>> = (shared.gains.iter())
             .map(|(drive, gain)| vec![TableCell::text(drive), value(Some(*gain))])
             .collect();
@@ -200,11 +183,7 @@ fn shared_fit_section(shared: &SharedFit) -> String {
             })
         })
         .collect();
-    html.push_str(&table(
-        "own",
-        &["recording", "of", "name", "#value", "unit"],
-        &rows,
-    ));
+    html.push_str(&table("own", &["recording", "of", "name", "#value", "unit"], &rows));
     html
 }
 
@@ -215,12 +194,7 @@ fn parameters(compared: &RunsComparison) -> String {
         steps.any(|step| step.parameter == *k)
     };
     // A parameter that no run determines has no picture.
-    let is_determined = |k: &usize| {
-        compared
-            .runs
-            .iter()
-            .any(|run| determined(run.alone[*k]).is_some())
-    };
+    let is_determined = |k: &usize| compared.runs.iter().any(|run| determined(run.alone[*k]).is_some());
     let all = (0..compared.parameters.len()).filter(is_determined);
     // Parameters with a lasting change are shown first, the others folded.
     let (changed, same): (Vec<usize>, Vec<usize>) = all.partition(has_changed);
@@ -299,14 +273,8 @@ pub fn parameter_history(
         }
         // The level lasts until the next change.
         let level = y.position(*now);
-        picture.path(
-            "curve c-after",
-            &format!("M{:.1} {level:.1}H{:.1}", at(*run), at(end)),
-        );
-        picture.path(
-            "cursor",
-            &format!("M{:.1} {:.1}V{:.1}", at(*run), y.start, y.end),
-        );
+        picture.path("curve c-after", &format!("M{:.1} {level:.1}H{:.1}", at(*run), at(end)));
+        picture.path("cursor", &format!("M{:.1} {:.1}V{:.1}", at(*run), y.start, y.end));
     }
     let says = format!("{} over {n} {what}s", info.name);
     format!(

@@ -37,10 +37,7 @@ pub(crate) fn density(signal: &[f64], rate: f64) -> Vec<(f64, f64)> {
             let part = &signal[*start..start + n];
             // The mean would leak into low frequencies.
             let mean = part.iter().sum::<f64>() / n as f64;
-            part.iter()
-                .zip(&window)
-                .map(|(x, w)| (x - mean) * w)
-                .collect()
+            part.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect()
         })
         .collect();
     // Frequencies are bins of the discrete Fourier transform; low ones may coincide.
@@ -96,10 +93,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             let rate = (n - 1) as f64 / (run.time[n - 1] - run.time[0]);
             density(&run.error(d), rate)
         };
-        let curves = [
-            Some(("c-before", of(before))),
-            after.map(|v| ("c-after", of(v))),
-        ];
+        let curves = [Some(("c-before", of(before))), after.map(|v| ("c-after", of(v)))];
         let curves: Vec<(&str, Vec<(f64, f64)>)> = curves.into_iter().flatten().collect();
         // The picture shows amplitude densities, whose unit is that of the force per root of Hz.
         let roots: Vec<f64> = curves
@@ -107,10 +101,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             .flat_map(|(_, c)| c.iter().map(|(_, v)| v.sqrt()))
             .filter(|v| *v > 0.0)
             .collect();
-        let frequencies: Vec<f64> = curves
-            .iter()
-            .flat_map(|(_, c)| c.iter().map(|(f, _)| *f))
-            .collect();
+        let frequencies: Vec<f64> = curves.iter().flat_map(|(_, c)| c.iter().map(|(f, _)| *f)).collect();
         if roots.is_empty() {
             continue;
         }
@@ -128,12 +119,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
             let mut path = String::new();
             for (k, (f, v)) in curve.iter().enumerate() {
                 let pen = if k == 0 { 'M' } else { 'L' };
-                let _ = write!(
-                    path,
-                    "{pen}{:.1} {:.1}",
-                    x.position(*f),
-                    y.position(v.sqrt())
-                );
+                let _ = write!(path, "{pen}{:.1} {:.1}", x.position(*f), y.position(v.sqrt()));
             }
             picture.path(&format!("curve {class}"), &path);
         }
@@ -171,9 +157,7 @@ mod tests {
                 .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let noise: Vec<f64> = (0..60_000)
-            .map(|_| (uniform() - 0.5) * 12_f64.sqrt())
-            .collect();
+        let noise: Vec<f64> = (0..60_000).map(|_| (uniform() - 0.5) * 12_f64.sqrt()).collect();
         let found = density(&noise, rate);
         let mean = found.iter().map(|(_, v)| v).sum::<f64>() / found.len() as f64;
         assert!((mean * rate / 2.0 - 1.0).abs() < 0.1, "{mean}");

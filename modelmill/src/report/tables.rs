@@ -86,9 +86,7 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
                 of(&|| evidence.map(|e| (percent(Some(e.gain)), e.gain))),
                 // Without noise the ratio is huge and only its size class matters.
                 of(&|| evidence.map(|e| (significant(e.blocks_t.min(999.0), 2), e.blocks_t))),
-                of(&|| {
-                    evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))
-                }),
+                of(&|| evidence.map(|e| (format!("{:.0}", e.effective_samples), e.effective_samples))),
             ]
         })
         .collect();
@@ -118,11 +116,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
         let force = runs.iter().flat_map(|k| &version.runs[*k].measured[d]);
         let size: f64 = force.map(|f| f * f).sum();
         let squares: f64 = error.iter().map(|e| e * e).sum();
-        if size > 0.0 {
-            (squares / size).sqrt()
-        } else {
-            0.0
-        }
+        if size > 0.0 { (squares / size).sqrt() } else { 0.0 }
     };
     let before = &findings.before;
     let rows: Vec<Vec<TableCell>> = before
@@ -141,10 +135,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
                 let last = nrms(after, d);
                 row.push(TableCell::number(&percent(Some(last)), last));
             }
-            row.push(TableCell::number(
-                &format!("{} {unit}", significant(noise, 2)),
-                noise,
-            ));
+            row.push(TableCell::number(&format!("{} {unit}", significant(noise, 2)), noise));
             row
         })
         .collect();
@@ -256,9 +247,9 @@ fn effect(findings: &DiagnosisFindings, found: &IdentifiedEffect, label: &str) -
 /// Text with a capital first letter.
 fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
+    letters
+        .next()
+        .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// All candidates with the result of the search; those after the first `FIRST` are folded.
@@ -395,11 +386,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
                 (Some(first), Some(last)) => last - first,
                 _ => 0.0,
             };
-            let rate = if span > 0.0 {
-                (n.max(2) - 1) as f64 / span
-            } else {
-                0.0
-            };
+            let rate = if span > 0.0 { (n.max(2) - 1) as f64 / span } else { 0.0 };
             vec![
                 TableCell::text(&run.name),
                 TableCell::text(if run.is_check { "validation" } else { "fit" }),
@@ -411,13 +398,7 @@ pub(crate) fn data(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) ->
         .collect();
     let mut html = table(
         "",
-        &[
-            "recording",
-            "used for",
-            "#samples",
-            "#duration",
-            "#sample rate",
-        ],
+        &["recording", "used for", "#samples", "#duration", "#sample rate"],
         &rows,
     );
     if findings.notes.is_empty() {

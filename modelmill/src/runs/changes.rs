@@ -28,9 +28,7 @@ impl ChangeEstimate {
     /// The value with its standard deviation and unit.
     fn text(self, unit: &str) -> String {
         let [value, deviation] = with_deviation(self.value, self.deviation);
-        format!("{value} +- {deviation} {unit}")
-            .trim_end()
-            .to_owned()
+        format!("{value} +- {deviation} {unit}").trim_end().to_owned()
     }
 
     /// Whether its standard deviation is below a third of its size.
@@ -108,28 +106,18 @@ impl PhysicalChange {
             Self::ContactEvent { drives, interval } => {
                 let names = drives.iter().map(|(name, _)| name.as_str()).collect();
                 // The times of an event are those of samples, so that they have no standard deviation.
-                let [from, to] = interval.map(|value| ChangeEstimate {
-                    value,
-                    deviation: 0.0,
-                });
+                let [from, to] = interval.map(|value| ChangeEstimate { value, deviation: 0.0 });
                 let times = vec![("from", from, "s"), ("to", to, "s")];
                 return ("contact_event", names, times);
             }
-            Self::Payload {
-                frame,
-                mass,
-                centre,
-            } => {
+            Self::Payload { frame, mass, centre } => {
                 let of_mass = mass.iter().map(|mass| ("mass", *mass, "kg"));
                 let at = ["x", "y", "z"].into_iter().zip(centre);
                 let at = at.filter_map(|(axis, at)| Some((axis, (*at)?, "m")));
                 ("payload", frame, of_mass.chain(at).collect())
             }
             Self::Friction {
-                drive,
-                dry,
-                viscous,
-                ..
+                drive, dry, viscous, ..
             } => (
                 "friction",
                 drive,
@@ -140,9 +128,7 @@ impl PhysicalChange {
             Self::Clock { factor } => {
                 return ("time_base", vec!["t"], vec![("factor", *factor, "1")]);
             }
-            Self::EncoderZero { coordinate, shift } => {
-                ("encoder_zero", coordinate, vec![("shift", *shift, unit)])
-            }
+            Self::EncoderZero { coordinate, shift } => ("encoder_zero", coordinate, vec![("shift", *shift, unit)]),
         };
         (kind, vec![at.as_str()], estimates)
     }
@@ -215,10 +201,7 @@ pub(crate) fn possible_changes(
     let mut all = Vec::new();
     for (f, frame) in payloads.frames.iter().enumerate() {
         let at = layout.payload(f);
-        all.push(possible(
-            ChangeKind::Payload(frame.clone()),
-            (at..at + TEN).collect(),
-        ));
+        all.push(possible(ChangeKind::Payload(frame.clone()), (at..at + TEN).collect()));
     }
     for drive in 0..model.drives().len() {
         let friction = layout.friction(drive);
@@ -231,8 +214,7 @@ pub(crate) fn possible_changes(
         }
     }
     all.push(possible(ChangeKind::Clock, vec![layout.clock()]));
-    let zeros =
-        (0..layout.coordinates).map(|i| possible(ChangeKind::EncoderZero(i), vec![layout.zero(i)]));
+    let zeros = (0..layout.coordinates).map(|i| possible(ChangeKind::EncoderZero(i), vec![layout.zero(i)]));
     all.extend(zeros);
     all
 }
@@ -250,11 +232,7 @@ pub(crate) fn identified_change(
         unit: unit(model, &possible[found.candidate].kind),
         change: what,
         gain: found.gain,
-        rivals: found
-            .rivals
-            .iter()
-            .map(|k| name(model, &possible[*k].kind))
-            .collect(),
+        rivals: found.rivals.iter().map(|k| name(model, &possible[*k].kind)).collect(),
     }
 }
 
@@ -263,9 +241,7 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
     let names = model.drives();
     let drives = event.drives.iter();
     let what = PhysicalChange::ContactEvent {
-        drives: drives
-            .map(|(d, largest, _)| (names[*d].clone(), *largest))
-            .collect(),
+        drives: drives.map(|(d, largest, _)| (names[*d].clone(), *largest)).collect(),
         interval: [event.from, event.to],
     };
     RunChange {
@@ -278,12 +254,7 @@ pub(crate) fn event(model: &Model, event: &ContactEvent) -> RunChange {
 }
 
 /// The physical values of a change that was found.
-fn physical_change(
-    model: &Model,
-    kind: &ChangeKind,
-    found: &SelectedChange,
-    values: &DVector<f64>,
-) -> PhysicalChange {
+fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, values: &DVector<f64>) -> PhysicalChange {
     let estimate = |i: usize| ChangeEstimate {
         value: found.values[i],
         deviation: found.covariance[(i, i)].max(0.0).sqrt(),
@@ -292,9 +263,7 @@ fn physical_change(
     match kind {
         ChangeKind::Payload(frame) => {
             // Mass and centre are given only if the mass is known.
-            let mass = found.determined[0]
-                .then(|| estimate(0))
-                .filter(|m| m.is_known());
+            let mass = found.determined[0].then(|| estimate(0)).filter(|m| m.is_known());
             PhysicalChange::Payload {
                 frame: frame.clone(),
                 mass,
@@ -337,9 +306,7 @@ fn physical_change(
 /// The unit of the values of a change: of a force, a coordinate, or none.
 fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
-        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => {
-            model.force_unit(*d)
-        }
+        ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => model.force_unit(*d),
         ChangeKind::EncoderZero(i) if model.motions()[*i].1 => "rad",
         ChangeKind::EncoderZero(_) | ChangeKind::Payload(_) => "m",
         ChangeKind::Clock => "1",
@@ -427,11 +394,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
         at.map_or("", |d| model.force_unit(d))
     };
     match what {
-        PhysicalChange::Payload {
-            frame,
-            mass,
-            centre,
-        } => {
+        PhysicalChange::Payload { frame, mass, centre } => {
             let Some(mass) = mass else {
                 return format!("another load on {frame}; this motion does not determine its mass");
             };
@@ -458,8 +421,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
             parts,
         } => {
             // Signs decide between the usual causes of more and of less friction.
-            let part =
-                |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
+            let part = |p: Option<f64>| p.map_or(String::new(), |p| format!(" ({:+.0} %)", 100.0 * p));
             let total: f64 = parts.iter().flatten().sum();
             let why = if total > 0.0 || (parts == &[None, None] && dry.value > 0.0) {
                 "colder, worn, or other grease"
@@ -494,9 +456,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
         } => {
             let drives: Vec<String> = drives
                 .iter()
-                .map(|(name, force)| {
-                    format!("{name} by up to {} {}", significant(*force, 3), unit(name))
-                })
+                .map(|(name, force)| format!("{name} by up to {} {}", significant(*force, 3), unit(name)))
                 .collect();
             format!(
                 "a contact or a push from {} to {} s: {}; excluded from what follows",

@@ -9,7 +9,7 @@ use crate::error::Outcome;
 use crate::model::Model;
 use crate::regressors::regressor;
 use crate::runs::payload::PayloadColumns;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Step of the central differences: fraction of a clock's rate, or rad or m of an encoder's zero.
 const TURNED: f64 = 1e-3;
@@ -29,11 +29,7 @@ impl SegmentRows {
     ///
     /// Fails when a pose has no solution, or a force was not measured.
     pub(crate) fn base_columns(model: &Model, stretch: &RecordingSegment) -> Outcome<Self> {
-        let base = regressor(
-            &[(stretch, false)],
-            &ModelEvaluator::new(&model.derivation),
-            model,
-        )?;
+        let base = regressor(&[(stretch, false)], &ModelEvaluator::new(&model.derivation), model)?;
         let mut forces = measured_forces(stretch)?;
         let mut columns = Vec::new();
         for (k, column) in base.into_iter().enumerate() {
@@ -141,11 +137,7 @@ fn counts(stretch: &RecordingSegment, forces: &[Vec<f64>]) -> Vec<Vec<bool>> {
 }
 
 /// The columns of payloads: ten for each body.
-fn payload_columns(
-    model: &Model,
-    stretch: &RecordingSegment,
-    payloads: &PayloadColumns,
-) -> Outcome<Vec<ForceColumn>> {
+fn payload_columns(model: &Model, stretch: &RecordingSegment, payloads: &PayloadColumns) -> Outcome<Vec<ForceColumn>> {
     let evaluator = ModelEvaluator::new(&payloads.derivation);
     let columns = regressor(&[(stretch, false)], &evaluator, model)?;
     let of = |k: &Option<usize>| k.map(|k| columns[k].clone()).unwrap_or_default();
@@ -153,11 +145,7 @@ fn payload_columns(
 }
 
 /// Columns of dry and viscous friction of each drive, followed by a constant force on each.
-fn drive_columns(
-    model: &Model,
-    stretch: &RecordingSegment,
-    samples: usize,
-) -> Outcome<Vec<ForceColumn>> {
+fn drive_columns(model: &Model, stretch: &RecordingSegment, samples: usize) -> Outcome<Vec<ForceColumn>> {
     let n = model.drives().len();
     // Each of these columns acts on one drive.
     let only = |drive: usize, values: Vec<f64>| {
@@ -179,11 +167,7 @@ fn drive_columns(
 
 /// Sets values to 0 where a sample does not count.
 fn zero_uncounted(values: &mut [f64], counts: &[bool]) {
-    for (value, _) in values
-        .iter_mut()
-        .zip(counts)
-        .filter(|(_, counts)| !**counts)
-    {
+    for (value, _) in values.iter_mut().zip(counts).filter(|(_, counts)| !**counts) {
         *value = 0.0;
     }
 }
@@ -240,10 +224,7 @@ fn prediction_columns(
         });
         let pairs = ahead?.into_iter().zip(back?);
         let of_drive = |(a, b): (Vec<f64>, Vec<f64>)| -> Vec<f64> {
-            a.iter()
-                .zip(&b)
-                .map(|(a, b)| (a - b) / (2.0 * TURNED))
-                .collect()
+            a.iter().zip(&b).map(|(a, b)| (a - b) / (2.0 * TURNED)).collect()
         };
         Ok(ForceColumn::new(pairs.map(of_drive).collect()))
     };

@@ -20,9 +20,7 @@ impl RunColumnLayout {
     /// The layout for a model and its payload columns.
     pub(crate) fn new(model: &Model, payloads: &PayloadColumns) -> Self {
         Self {
-            base: (0..model.base.len())
-                .filter(|k| !model.is_known(*k))
-                .count(),
+            base: (0..model.base.len()).filter(|k| !model.is_known(*k)).count(),
             payloads: payloads.frames.len(),
             drives: model.drives().len(),
             coordinates: model.active_coordinates().len(),

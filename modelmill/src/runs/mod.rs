@@ -30,7 +30,7 @@ use crate::audit::events::{self, ContactEvent};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 pub use changes::{ChangeEstimate, NamedEstimate, PhysicalChange, RunChange};
 use changes::{ChangeHypothesis, centre};
@@ -40,9 +40,7 @@ pub use per_run::{KnownLoad, PerRunSelection, RunValue, SharedFit};
 pub use points::{ChangePoint, ParameterStep};
 use rows::{MeasuredMoments, RunRows, WhitenedRun};
 pub use sums::{ReferenceFit, RunSums};
-use thresholds::{
-    CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S,
-};
+use thresholds::{CHANGE_LEAST_FORCE_SHARE, PARAMETER_CHANGE_SIGMAS, PUSH_MARGIN_SHARE, SHORTEST_PUSH_S};
 
 /// A fitted value with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,79 +149,71 @@ impl Model {
         let mut shared = per_run::SharedFitBuilder::new(self, &payloads, layout, asked)?;
         let mut recordings = recordings.into_iter();
         let total = recordings.size_hint().0;
-        self.host()
-            .run_job("comparing runs with the first", total, |job| {
-                let Some(first) = recordings.next() else {
-                    return Err(Error::options("there is no recording; give two or more"));
-                };
-                // Stage 1: the first run is the reference. Its base parameters determine the columns of scales
-                // and clocks.
-                let first = first.map_err(|unread| unread.error)?;
-                let first = first.borrow();
-                let before = bench.analyse_run(first, None)?;
-                let mut all = vec![bench.run_report(&before, &before)];
-                let mut notes: Vec<RecordingNote> = first.notes().cloned().collect();
-                let mut wholes = vec![before.white.total()];
-                let mut withins = vec![before.within];
-                let mut unread = Vec::new();
-                shared.add_run(&before.file, &before.white);
+        self.host().run_job("comparing runs with the first", total, |job| {
+            let Some(first) = recordings.next() else {
+                return Err(Error::options("there is no recording; give two or more"));
+            };
+            // Stage 1: the first run is the reference. Its base parameters determine the columns of scales
+            // and clocks.
+            let first = first.map_err(|unread| unread.error)?;
+            let first = first.borrow();
+            let before = bench.analyse_run(first, None)?;
+            let mut all = vec![bench.run_report(&before, &before)];
+            let mut notes: Vec<RecordingNote> = first.notes().cloned().collect();
+            let mut wholes = vec![before.white.total()];
+            let mut withins = vec![before.within];
+            let mut unread = Vec::new();
+            shared.add_run(&before.file, &before.white);
+            job.step(1)?;
+            // Stage 2: each later run is compared with it.
+            for recording in recordings {
+                let looked_at = recording.and_then(|recording| {
+                    let recording = recording.borrow();
+                    notes.extend(recording.notes().cloned());
+                    let file = recording.file().to_owned();
+                    let run = bench.analyse_run(recording, Some(&before.values));
+                    run.map_err(|error| UnreadRun { file, error })
+                });
                 job.step(1)?;
-                // Stage 2: each later run is compared with it.
-                for recording in recordings {
-                    let looked_at = recording.and_then(|recording| {
-                        let recording = recording.borrow();
-                        notes.extend(recording.notes().cloned());
-                        let file = recording.file().to_owned();
-                        let run = bench.analyse_run(recording, Some(&before.values));
-                        run.map_err(|error| UnreadRun { file, error })
-                    });
-                    job.step(1)?;
-                    match looked_at {
-                        Ok(run) => {
-                            let mut one = bench.run_report(&run, &before);
-                            one.changes.extend(bench.changes(&before, &run));
-                            all.push(one);
-                            wholes.push(run.white.total());
-                            withins.push(run.within);
-                            shared.add_run(&run.file, &run.white);
-                        }
-                        Err(UnreadRun {
-                            error: Error::Cancelled,
-                            ..
-                        }) => return Err(Error::Cancelled),
-                        Err(one) => unread.push(one),
+                match looked_at {
+                    Ok(run) => {
+                        let mut one = bench.run_report(&run, &before);
+                        one.changes.extend(bench.changes(&before, &run));
+                        all.push(one);
+                        wholes.push(run.white.total());
+                        withins.push(run.within);
+                        shared.add_run(&run.file, &run.white);
                     }
+                    Err(UnreadRun {
+                        error: Error::Cancelled,
+                        ..
+                    }) => return Err(Error::Cancelled),
+                    Err(one) => unread.push(one),
                 }
-                // A comparison needs a second run.
-                if all.len() < 2 {
-                    return Err(too_few_runs_error(&before.file, &unread));
-                }
-                // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
-                let base: Vec<usize> = (0..layout.base).collect();
-                let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
-                let points = points::find_change_points(
-                    &bench,
-                    &alone,
-                    &wholes,
-                    &withins,
-                    &before.sizes,
-                    &before.values,
-                );
-                let mut together = NormalEquations::new(layout.base);
-                for whole in &wholes {
-                    together.merge(&whole.select_columns(&base));
-                }
-                Ok(RunsComparison {
-                    model: self.name.clone(),
-                    parameters: self.parameter_infos(),
-                    together: fit_parameters(self, &together),
-                    points,
-                    runs: all,
-                    unread,
-                    shared: shared.answer()?,
-                    notes,
-                })
-            })?
+            }
+            // A comparison needs a second run.
+            if all.len() < 2 {
+                return Err(too_few_runs_error(&before.file, &unread));
+            }
+            // Stage 3: permanent changes over the order of the runs, and the fit of all runs together.
+            let base: Vec<usize> = (0..layout.base).collect();
+            let alone: Vec<&[FittedValue]> = all.iter().map(|run| &run.alone[..]).collect();
+            let points = points::find_change_points(&bench, &alone, &wholes, &withins, &before.sizes, &before.values);
+            let mut together = NormalEquations::new(layout.base);
+            for whole in &wholes {
+                together.merge(&whole.select_columns(&base));
+            }
+            Ok(RunsComparison {
+                model: self.name.clone(),
+                parameters: self.parameter_infos(),
+                together: fit_parameters(self, &together),
+                points,
+                runs: all,
+                unread,
+                shared: shared.answer()?,
+                notes,
+            })
+        })?
     }
 }
 
@@ -276,16 +266,11 @@ pub(crate) struct RunStatistics {
 }
 
 /// Events of measured forces; events that follow each other at once are merged.
-fn merged_contact_events(
-    events: Vec<ContactEvent>,
-    stretch: &RecordingSegment,
-) -> Vec<ContactEvent> {
+fn merged_contact_events(events: Vec<ContactEvent>, stretch: &RecordingSegment) -> Vec<ContactEvent> {
     let mut all: Vec<ContactEvent> = Vec::new();
     for mut event in events {
         let (from, to) = (event.from, event.to);
-        event
-            .drives
-            .retain(|(d, ..)| is_measured(stretch, *d, from, to));
+        event.drives.retain(|(d, ..)| is_measured(stretch, *d, from, to));
         if event.drives.is_empty() {
             continue;
         }
@@ -340,11 +325,7 @@ impl<'a> RunAnalyser<'a> {
 
     /// The sums of a run, without its contacts and pushes. `values` are the base parameters of the first run,
     /// `None` for the first run itself.
-    fn analyse_run(
-        &self,
-        recording: &PreparedRecording,
-        values: Option<&DVector<f64>>,
-    ) -> Outcome<RunStatistics> {
+    fn analyse_run(&self, recording: &PreparedRecording, values: Option<&DVector<f64>>) -> Outcome<RunStatistics> {
         let mut stretches = recording.segments.clone();
         let mut told = Vec::new();
         for stretch in &mut stretches {
@@ -361,9 +342,7 @@ impl<'a> RunAnalyser<'a> {
             });
             events::leave_out_events(stretch, &wide.collect::<Vec<_>>());
             // Short events are excluded, but not reported.
-            let lasting = found
-                .iter()
-                .filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
+            let lasting = found.iter().filter(|event| event.to - event.from >= SHORTEST_PUSH_S);
             told.extend(lasting.map(|event| changes::event(self.model, event)));
         }
         let rows = RunRows::new(self.model, &stretches, self.payloads, values)?;
@@ -385,21 +364,15 @@ impl<'a> RunAnalyser<'a> {
     /// The report of a run fitted alone: values, changed parameters and events. `before` is the first run.
     fn run_report(&self, run: &RunStatistics, before: &RunStatistics) -> RunReport {
         let base: Vec<usize> = (0..self.layout.base).collect();
-        let of = |run: &RunStatistics| {
-            fit_parameters(self.model, &run.white.total().select_columns(&base))
-        };
+        let of = |run: &RunStatistics| fit_parameters(self.model, &run.white.total().select_columns(&base));
         let (alone, reference) = (of(run), of(before));
         // Only parameters that both runs determine can be compared.
         let differs = |(a, b): (&FittedValue, &FittedValue)| {
             let is_known = a.deviation.is_some() && b.deviation.is_some();
-            is_known
-                && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * a.difference_deviation(*b)
+            is_known && (a.value - b.value).abs() > PARAMETER_CHANGE_SIGMAS * a.difference_deviation(*b)
         };
         let pairs = alone.iter().zip(&reference).map(differs);
-        let moved = pairs
-            .enumerate()
-            .filter_map(|(k, d)| d.then_some(k))
-            .collect();
+        let moved = pairs.enumerate().filter_map(|(k, d)| d.then_some(k)).collect();
         RunReport {
             file: run.file.clone(),
             samples: run.samples,
@@ -435,11 +408,7 @@ impl<'a> RunAnalyser<'a> {
     }
 
     /// Changes with their physical values and texts.
-    fn identified_changes(
-        &self,
-        found: &[SelectedChange],
-        values: &DVector<f64>,
-    ) -> Vec<RunChange> {
+    fn identified_changes(&self, found: &[SelectedChange], values: &DVector<f64>) -> Vec<RunChange> {
         let told = found.iter();
         told.map(|one| changes::identified_change(self.model, &self.possible, one, values))
             .collect()
@@ -459,10 +428,7 @@ pub(crate) struct RecordingDifference {
 }
 
 /// Changes of later recordings relative to the first, with the forces that they cause.
-pub(crate) fn differences(
-    model: &Model,
-    recordings: &[&PreparedRecording],
-) -> Outcome<Vec<RecordingDifference>> {
+pub(crate) fn differences(model: &Model, recordings: &[&PreparedRecording]) -> Outcome<Vec<RecordingDifference>> {
     let [first, later @ ..] = recordings else {
         return Ok(Vec::new());
     };
@@ -470,9 +436,7 @@ pub(crate) fn differences(
     let bench = RunAnalyser::new(model, &payloads);
     let before = bench.analyse_run(first, None)?;
     // Forces are placed within the samples of all recordings.
-    let samples = |one: &PreparedRecording| -> usize {
-        one.segments.iter().map(|one| one.time().len()).sum()
-    };
+    let samples = |one: &PreparedRecording| -> usize { one.segments.iter().map(|one| one.time().len()).sum() };
     let total: usize = recordings.iter().map(|one| samples(one)).sum();
     let mut start = samples(first);
     let mut differences = Vec::new();
@@ -489,15 +453,9 @@ pub(crate) fn differences(
                 Some(&before.values),
             )?),
         };
-        for (one, changed) in found
-            .iter()
-            .zip(bench.identified_changes(&found, &before.values))
-        {
+        for (one, changed) in found.iter().zip(bench.identified_changes(&found, &before.values)) {
             let Some(rows) = &rows else { continue };
-            let own = rows.force(
-                &bench.possible[one.candidate].candidate.columns,
-                &one.values,
-            )?;
+            let own = rows.force(&bench.possible[one.candidate].candidate.columns, &one.values)?;
             let along_all = |values: Vec<f64>| {
                 let mut all = vec![0.0; total];
                 if values.len() == end - start {
@@ -521,8 +479,7 @@ pub(crate) fn differences(
 fn fit_parameters(model: &Model, moments: &NormalEquations) -> Vec<FittedValue> {
     let solved = moments.solve();
     // If the rows scatter more than assumed, the standard deviations grow accordingly.
-    let noise =
-        (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
+    let noise = (solved.residual_squares / (moments.rows as f64 - solved.rank as f64).max(1.0)).max(1.0);
     merge_known(model, |i| FittedValue {
         value: solved.values[i],
         deviation: solved.determined[i].then(|| (noise * solved.covariance[(i, i)]).sqrt()),

@@ -3,8 +3,7 @@
 
 use modelmill_codegen::{Derivation, derive_columns};
 use modelmill_spec::{
-    DynamicParameter, ExactExpression, FrameIdx, Mechanism, ModelPart, ModelSymbol, ParameterIdx,
-    PartInertia,
+    DynamicParameter, ExactExpression, FrameIdx, Mechanism, ModelPart, ModelSymbol, ParameterIdx, PartInertia,
 };
 
 use crate::error::{Error, Outcome};
@@ -40,8 +39,7 @@ impl PayloadColumns {
         let (variant, own) = with_bodies(mechanism, &frames);
         // Only products of a single new parameter are derived.
         let is_wanted = |product: &modelmill_codegen::ParameterMonomial| matches!(product.0[..], [(p, 1)] if p >= own);
-        let derivation = derive_columns(&variant, &is_wanted)
-            .map_err(|error| Error::derivation(&model.path, error))?;
+        let derivation = derive_columns(&variant, &is_wanted).map_err(|error| Error::derivation(&model.path, error))?;
         let reduction = &derivation.reduction;
         // Parameters without effect on the drives have no column.
         let products: Vec<usize> = reduction
@@ -69,8 +67,7 @@ fn with_bodies(mechanism: &Mechanism, frames: &[FrameIdx]) -> (Mechanism, usize)
     let own = variant.parameters.len();
     for frame in frames {
         let first = variant.parameters.len();
-        let value =
-            |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
+        let value = |i: usize| ExactExpression::Symbol(ModelSymbol::Parameter(ParameterIdx(first + i)));
         variant.parts.push(ModelPart {
             name: format!("payload of {}", variant.frames[frame.0].name),
             frame: *frame,

@@ -99,11 +99,8 @@ impl KnownLoad {
     ///
     /// Fails with the expected form, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let expected = || {
-            format!(
-                "`{text}`: a run, its load in kg and the body are expected, as in `with-tool.csv=2.8@flange`"
-            )
-        };
+        let expected =
+            || format!("`{text}`: a run, its load in kg and the body are expected, as in `with-tool.csv=2.8@flange`");
         let (run, load) = text.rsplit_once('=').ok_or_else(expected)?;
         let (mass, frame) = load.split_once('@').ok_or_else(expected)?;
         let mass: f64 = mass.trim().parse().map_err(|_| expected())?;
@@ -233,11 +230,7 @@ impl<'a> SharedFitBuilder<'a> {
         let sums = if self.loads.is_empty() {
             vec![white.total().select_columns(&self.used)]
         } else {
-            white
-                .drives
-                .iter()
-                .map(|one| one.select_columns(&self.used))
-                .collect()
+            white.drives.iter().map(|one| one.select_columns(&self.used)).collect()
         };
         self.runs.push((file.to_owned(), sums));
     }
@@ -254,21 +247,14 @@ impl<'a> SharedFitBuilder<'a> {
         if !self.is_requested() {
             return Ok(None);
         }
-        let loads: Outcome<Vec<usize>> = self
-            .loads
-            .iter()
-            .map(|load| self.run_of_load(load))
-            .collect();
+        let loads: Outcome<Vec<usize>> = self.loads.iter().map(|load| self.run_of_load(load)).collect();
         let loads = loads?;
         // Base parameters that are separate for each run are not shared.
         let absolute = (self.own.iter()).filter(|one| !one.is_against_first);
         let not_shared: Vec<usize> = absolute.flat_map(|one| one.columns.clone()).collect();
-        let shared: Vec<usize> = (0..self.layout.base)
-            .filter(|k| !not_shared.contains(k))
-            .collect();
-        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> = (0..self.runs.len())
-            .map(|r| self.run_part(r, &loads))
-            .collect();
+        let shared: Vec<usize> = (0..self.layout.base).filter(|k| !not_shared.contains(k)).collect();
+        let parts: Vec<(JointRun, Vec<&PerRunColumns>)> =
+            (0..self.runs.len()).map(|r| self.run_part(r, &loads)).collect();
         let (parts, owns): (Vec<JointRun>, Vec<Vec<&PerRunColumns>>) = parts.into_iter().unzip();
         let places: Vec<usize> = shared.iter().map(|k| self.place(*k)).collect();
         let found = fit_jointly(&parts, &places, !self.loads.is_empty());
@@ -306,9 +292,7 @@ impl<'a> SharedFitBuilder<'a> {
 
     /// The separate columns of a run, with the known mass of its load.
     fn run_part(&self, r: usize, loads: &[usize]) -> (JointRun, Vec<&PerRunColumns>) {
-        let owns: Vec<&PerRunColumns> = (self.own.iter())
-            .filter(|one| r > 0 || !one.is_against_first)
-            .collect();
+        let owns: Vec<&PerRunColumns> = (self.own.iter()).filter(|one| r > 0 || !one.is_against_first).collect();
         let mut own: Vec<usize> = owns.iter().flat_map(|one| one.columns.clone()).collect();
         let mut known = Vec::new();
         for ((load, at), _) in (self.loads.iter().zip(&self.loaded))
@@ -363,9 +347,7 @@ impl<'a> SharedFitBuilder<'a> {
         let runs = self.runs.iter().zip(parts).zip(owns).zip(&found.own);
         SharedFit {
             shared: (0..self.model.base.len()).map(of_base).collect(),
-            gains: (drives.filter(|_| !self.loads.is_empty()))
-                .map(gain)
-                .collect(),
+            gains: (drives.filter(|_| !self.loads.is_empty())).map(gain).collect(),
             runs: runs
                 .map(|((((file, _), part), owns), values)| {
                     let own = owns.iter().flat_map(|own| self.values(own, part, values));
@@ -399,18 +381,11 @@ impl<'a> SharedFitBuilder<'a> {
         // The centre needs mass and first moments in the fit.
         if let (TEN, Some(places)) = (
             own.columns.len(),
-            places
-                .iter()
-                .take(4)
-                .copied()
-                .collect::<Option<Vec<usize>>>(),
+            places.iter().take(4).copied().collect::<Option<Vec<usize>>>(),
         ) {
             let four = JointValues {
                 values: values.values.select_rows(&places),
-                covariance: values
-                    .covariance
-                    .select_rows(&places)
-                    .select_columns(&places),
+                covariance: values.covariance.select_rows(&places).select_columns(&places),
                 determined: places.iter().map(|k| values.determined[*k]).collect(),
             };
             let axes = ["x", "y", "z"].into_iter().zip(centre(&four));
@@ -443,10 +418,7 @@ fn frame(payloads: &PayloadColumns, name: &str) -> Outcome<usize> {
 
 /// The error of an unknown name.
 fn unknown_name_error(what: &str, name: &str, names: &[String]) -> Error {
-    Error::options(format!(
-        "there is no {what} `{name}`; there are {}",
-        names.join(", ")
-    ))
+    Error::options(format!("there is no {what} `{name}`; there are {}", names.join(", ")))
 }
 
 /// The columns of a request, one entry for each of its places.
@@ -554,9 +526,7 @@ fn base_parameter(
     infos: &[ParameterInfo],
     name: &str,
 ) -> Outcome<PerRunColumns> {
-    let unknown: Vec<usize> = (0..model.base.len())
-        .filter(|k| !model.is_known(*k))
-        .collect();
+    let unknown: Vec<usize> = (0..model.base.len()).filter(|k| !model.is_known(*k)).collect();
     let Some(column) = unknown.iter().position(|k| infos[*k].name == name) else {
         return Err(Error::options(format!(
             "`{name}` is neither a base parameter whose value is unknown nor a kind; kinds are {}, as in `payload@{}`, \

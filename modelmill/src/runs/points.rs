@@ -1,8 +1,6 @@
 //! Permanent changes of parameters over the order of the runs, and their physical meaning.
 
-use modelmill_identify::changes::{
-    NormalEquations, RunPair, UncertainValue, change_points, weighted_mean,
-};
+use modelmill_identify::changes::{NormalEquations, RunPair, UncertainValue, change_points, weighted_mean};
 
 use nalgebra::DVector;
 
@@ -55,10 +53,7 @@ pub(crate) fn find_change_points(
     // Stage 1: steps of each parameter over the order of the runs.
     let mut steps: Vec<(usize, ParameterStep)> = Vec::new();
     for parameter in &parameters {
-        let told: Vec<Option<UncertainValue>> = runs
-            .iter()
-            .map(|run| known_value(run[*parameter]))
-            .collect();
+        let told: Vec<Option<UncertainValue>> = runs.iter().map(|run| known_value(run[*parameter])).collect();
         let mut bounds = change_points(&told, parameters.len());
         bounds.insert(0, 0);
         bounds.push(runs.len());
@@ -70,14 +65,7 @@ pub(crate) fn find_change_points(
             });
             if let (Some(before), Some(now)) = (before, now) {
                 let parameter = *parameter;
-                steps.push((
-                    three[1],
-                    ParameterStep {
-                        parameter,
-                        before,
-                        now,
-                    },
-                ));
+                steps.push((three[1], ParameterStep { parameter, before, now }));
             }
         }
     }
@@ -87,9 +75,7 @@ pub(crate) fn find_change_points(
     // Stage 3: the sums before and after each point are searched for physical changes.
     let point = |three: &[usize]| {
         let (start, at, end) = (three[0], three[1], three[2]);
-        let own = steps
-            .iter()
-            .filter(|(run, _)| run.abs_diff(at) <= CHANGE_POINT_RUNS);
+        let own = steps.iter().filter(|(run, _)| run.abs_diff(at) <= CHANGE_POINT_RUNS);
         let mut own: Vec<ParameterStep> = own.map(|(_, step)| *step).collect();
         own.sort_by(|a, b| b.deviations().total_cmp(&a.deviations()));
         let both = RunPair {
@@ -125,10 +111,7 @@ fn step_runs(steps: &[(usize, ParameterStep)]) -> Vec<usize> {
     weights.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut kept: Vec<usize> = Vec::new();
     for (run, _) in weights {
-        if kept
-            .iter()
-            .all(|other| other.abs_diff(run) > CHANGE_POINT_RUNS)
-        {
+        if kept.iter().all(|other| other.abs_diff(run) > CHANGE_POINT_RUNS) {
             kept.push(run);
         }
     }

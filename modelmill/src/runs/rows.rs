@@ -13,7 +13,7 @@ use crate::runs::columns::SegmentRows;
 use crate::runs::layout::RunColumnLayout;
 use crate::runs::payload::PayloadColumns;
 use crate::runs::thresholds::NOISE_FLOOR_SHARE;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Number of blocks of a run for cross-validation.
 pub(crate) const BLOCKS: usize = 8;
@@ -68,14 +68,12 @@ impl<'a> RunRows<'a> {
     /// Fails when a pose has no solution, a force was not measured, or values are too large for a fit.
     pub(crate) fn new(
         model: &'a Model,
-        stretches: &[RecordingSegment],
+        segments: &[RecordingSegment],
         payloads: &'a PayloadColumns,
         values: Option<&DVector<f64>>,
     ) -> Outcome<Self> {
         let layout = RunColumnLayout::new(model, payloads);
-        let pieces: Vec<RecordingSegment> = (stretches.iter())
-            .flat_map(|stretch| stretch.pieces(PIECE))
-            .collect();
+        let pieces: Vec<RecordingSegment> = (segments.iter()).flat_map(|stretch| stretch.pieces(PIECE)).collect();
         // The first run is fitted with its base columns alone.
         let values = match values {
             Some(values) => values.clone(),
@@ -158,21 +156,14 @@ impl<'a> RunRows<'a> {
         self.visit(|laid| {
             for (drive, rests) in rests.iter_mut().enumerate() {
                 let rest = laid.residual(drive, &values);
-                rests.extend(
-                    laid.pieces(drive)
-                        .into_iter()
-                        .map(|some| rest[some].to_vec()),
-                );
+                rests.extend(laid.pieces(drive).into_iter().map(|some| rest[some].to_vec()));
             }
             Ok(())
         })?;
         // Stage 2: an autoregressive model of each drive's residual.
         let noise = |(rests, sums): (&Vec<Vec<f64>>, &NormalEquations)| {
             let rests: Vec<&[f64]> = rests.iter().map(Vec::as_slice).collect();
-            AutoregressiveNoise::from_residual(
-                &rests,
-                NOISE_FLOOR_SHARE * effective_value(sums, sums.total),
-            )
+            AutoregressiveNoise::from_residual(&rests, NOISE_FLOOR_SHARE * effective_value(sums, sums.total))
         };
         let noise: Vec<AutoregressiveNoise> = rests.iter().zip(&self.sums).map(noise).collect();
         let length: usize = (self.pieces.iter())
@@ -187,11 +178,7 @@ impl<'a> RunRows<'a> {
         let mut before = 0;
         let zeros = [0.0; TOGETHER];
         self.visit(|laid| {
-            for (drive, noise) in noise
-                .iter()
-                .enumerate()
-                .filter(|(_, n)| n.standard_deviation > 0.0)
-            {
+            for (drive, noise) in noise.iter().enumerate().filter(|(_, n)| n.standard_deviation > 0.0) {
                 // The filter restarts after each gap.
                 for some in laid.pieces(drive) {
                     let start = before + some.start;
@@ -203,14 +190,9 @@ impl<'a> RunRows<'a> {
                         white.blocks[block.min(BLOCKS - 1)].merge(&sums);
                         white.drives[drive].merge(&sums);
                         let z = z[..layout.base].iter();
-                        let z: Vec<&[f64]> = z
-                            .map(|column| column.unwrap_or(&zeros[..y.len()]))
-                            .collect();
+                        let z: Vec<&[f64]> = z.map(|column| column.unwrap_or(&zeros[..y.len()])).collect();
                         white.base.add_columns(drive, &z, y).map_err(|error| {
-                            Error::input(format!(
-                                "the rows of {}: {error}",
-                                drive_name(self.model, drive)
-                            ))
+                            Error::input(format!("the rows of {}: {error}", drive_name(self.model, drive)))
                         })
                     })?;
                 }
@@ -231,8 +213,7 @@ impl MeasuredMoments {
     /// which come first.
     pub(crate) fn residual_ratios(&self, base: usize) -> Outcome<Vec<f64>> {
         let base: Vec<usize> = (0..base).collect();
-        let sums: Vec<NormalEquations> =
-            self.0.iter().map(|one| one.select_columns(&base)).collect();
+        let sums: Vec<NormalEquations> = self.0.iter().map(|one| one.select_columns(&base)).collect();
         let values = weighted_least_squares(&sums)?;
         let part = |one: &NormalEquations| {
             if one.total > 0.0 {
@@ -279,9 +260,7 @@ fn whiten(
     // The same filter is applied to force and columns.
     let white = |values: &[f64]| noise.whiten(&values[some.clone()]);
     let y = white(&laid.forces[drive]);
-    let z: Vec<Option<Vec<f64>>> = (0..columns)
-        .map(|k| laid.column(k, drive).map(white))
-        .collect();
+    let z: Vec<Option<Vec<f64>>> = (0..columns).map(|k| laid.column(k, drive).map(white)).collect();
     for start in (0..y.len()).step_by(TOGETHER) {
         let rows = start..(start + TOGETHER).min(y.len());
         let z: Vec<Option<&[f64]>> = z
@@ -309,10 +288,7 @@ fn effective_value(sums: &NormalEquations, squares: f64) -> f64 {
 
 /// Least squares with each drive weighted by its residual.
 fn weighted_least_squares(sums: &[NormalEquations]) -> Outcome<DVector<f64>> {
-    let mut deviations: Vec<f64> = sums
-        .iter()
-        .map(|one| effective_value(one, one.total))
-        .collect();
+    let mut deviations: Vec<f64> = sums.iter().map(|one| effective_value(one, one.total)).collect();
     let floors: Vec<f64> = deviations.iter().map(|size| 1e-6 * size).collect();
     let mut values = DVector::zeros(0);
     // Weights start from the forces and are then computed from the residuals.

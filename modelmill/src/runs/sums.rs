@@ -7,9 +7,7 @@
 
 use std::sync::Arc;
 
-use modelmill_identify::changes::{
-    NormalEquations, RunPair, fit_single_change, single_change_gains,
-};
+use modelmill_identify::changes::{NormalEquations, RunPair, fit_single_change, single_change_gains};
 use modelmill_identify::{LeastSquaresError, RFactor};
 use nalgebra::DVector;
 
@@ -176,12 +174,7 @@ impl ReferenceFit {
 
     /// Changes of later runs relative to those before, the largest first. `within` is the difference between parts
     /// of one run, or between runs that are assumed to be equal.
-    pub fn changes(
-        &self,
-        before: &[NormalEquations],
-        later: &[NormalEquations],
-        within: f64,
-    ) -> Vec<RunChange> {
+    pub fn changes(&self, before: &[NormalEquations], later: &[NormalEquations], within: f64) -> Vec<RunChange> {
         let bench = self.analyser();
         let runs = RunPair {
             reference: before.to_vec(),
@@ -198,12 +191,7 @@ impl ReferenceFit {
     }
 
     /// One of these changes, by its index, whatever it explains.
-    pub fn single_change(
-        &self,
-        before: &[NormalEquations],
-        later: &NormalEquations,
-        which: usize,
-    ) -> RunChange {
+    pub fn single_change(&self, before: &[NormalEquations], later: &NormalEquations, which: usize) -> RunChange {
         let bench = self.analyser();
         let found = fit_single_change(&pair_runs(before, later), &bench.search, which);
         changes::identified_change(&self.model, &bench.possible, &found, &self.values)
@@ -214,9 +202,7 @@ impl ReferenceFit {
         self.analyser()
             .possible
             .get(which)
-            .map_or_else(String::new, |possible| {
-                changes::name(&self.model, &possible.kind)
-            })
+            .map_or_else(String::new, |possible| changes::name(&self.model, &possible.kind))
     }
 }
 

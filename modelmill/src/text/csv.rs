@@ -55,24 +55,18 @@ mod tests {
         let values = [1.5, -0.25e-30];
         let columns: Vec<(&str, &[f64])> = names.iter().map(|name| (*name, &values[..])).collect();
         let options = ReadOptions::default();
-        let read =
-            SignalRecording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
+        let read = SignalRecording::from_bytes(csv(&columns).as_bytes(), "run.csv", &options).unwrap();
         for name in names {
             assert_eq!(read.column(name).unwrap(), values, "{name}");
         }
         // Line breaks and control characters of a terminal are replaced.
         let steering = csv(&[("two\r\nlines\t\u{1b}[2J\u{202e}", &values)]);
-        assert_eq!(
-            steering.lines().next(),
-            Some("two lines \u{fffd}[2J\u{fffd}")
-        );
+        assert_eq!(steering.lines().next(), Some("two lines \u{fffd}[2J\u{fffd}"));
         // A field that begins with such a sign would be a formula in a spreadsheet.
         let header = csv(&columns);
         let header = header.lines().next().unwrap_or_default();
         for sign in ["=", "+", "-", "@"] {
-            assert!(
-                !header.contains(&format!(",{sign}")) && !header.contains(&format!(",\"{sign}"))
-            );
+            assert!(!header.contains(&format!(",{sign}")) && !header.contains(&format!(",\"{sign}")));
         }
     }
 }

@@ -113,16 +113,8 @@ impl<'a> SvgFigure<'a> {
             Some(_) => value.to_string(),
             None => format!("{value:.4}"),
         };
-        for (value, label) in [
-            (limit, text(limit)),
-            (0.0, "0".to_owned()),
-            (-limit, text(-limit)),
-        ] {
-            let label = if label.len() > 9 {
-                format!("{value:.2e}")
-            } else {
-                label
-            };
+        for (value, label) in [(limit, text(limit)), (0.0, "0".to_owned()), (-limit, text(-limit))] {
+            let label = if label.len() > 9 { format!("{value:.2e}") } else { label };
             let _ = writeln!(
                 body,
                 r#"<text x="{:.1}" y="{:.1}" text-anchor="end" class="scale">{label}</text>"#,
@@ -200,10 +192,10 @@ pub fn thin_out(values: &[f64], wanted: usize) -> Vec<(usize, f64)> {
     if values.len() <= wanted {
         return values.iter().copied().enumerate().collect();
     }
-    let stretch = values.len().div_ceil((wanted / 2).max(1));
+    let segment = values.len().div_ceil((wanted / 2).max(1));
     let mut points = Vec::with_capacity(wanted + 2);
-    for (k, span) in values.chunks(stretch).enumerate() {
-        let at = |i: usize| (k * stretch + i, span[i]);
+    for (k, span) in values.chunks(segment).enumerate() {
+        let at = |i: usize| (k * segment + i, span[i]);
         let by = |a: &usize, b: &usize| span[*a].total_cmp(&span[*b]);
         let low = (0..span.len()).min_by(by).unwrap_or(0);
         let high = (0..span.len()).max_by(by).unwrap_or(0);

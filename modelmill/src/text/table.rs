@@ -19,11 +19,7 @@ pub enum ColumnAlignment {
 /// let rows = [vec!["x".to_owned(), "10".to_owned()]];
 /// assert_eq!(table(2, &columns, &rows), ["  a   n", "  x  10"]);
 /// ```
-pub fn table(
-    indent: usize,
-    columns: &[(&str, ColumnAlignment)],
-    rows: &[Vec<String>],
-) -> Vec<String> {
+pub fn table(indent: usize, columns: &[(&str, ColumnAlignment)], rows: &[Vec<String>]) -> Vec<String> {
     let head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
     let all: Vec<&Vec<String>> = std::iter::once(&head).chain(rows).collect();
     // A column is as wide as its longest cell, in letters rather than bytes.
@@ -166,10 +162,7 @@ mod tests {
         ];
         let lines = table(
             2,
-            &[
-                ("name", ColumnAlignment::Left),
-                ("n", ColumnAlignment::Right),
-            ],
+            &[("name", ColumnAlignment::Left), ("n", ColumnAlignment::Right)],
             &rows,
         );
         assert_eq!(lines, ["  name   n", "  a      1", "  long  10"]);

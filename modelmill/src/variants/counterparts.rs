@@ -5,7 +5,7 @@ use modelmill_identify::{PreparedRun, RecordingNote};
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::free::free_bodies;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Coordinates and drives that two models share.
 pub(super) struct ModelCounterparts {
@@ -89,11 +89,7 @@ impl ModelCounterparts {
     /// The states of a motion in the order of each model, with the load that its own forces cause.
     ///
     /// Fails when a model cannot follow the motion.
-    pub(super) fn own_states(
-        &self,
-        models: [&Model; 2],
-        motion: &RecordingSegment,
-    ) -> Outcome<[RecordingSegment; 2]> {
+    pub(super) fn own_states(&self, models: [&Model; 2], motion: &RecordingSegment) -> Outcome<[RecordingSegment; 2]> {
         // The second model may list its coordinates in another order.
         let in_order = |columns: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let places = self.coordinates.iter();
@@ -145,19 +141,13 @@ fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
     // Both directions are tested, so that the message names the model that lacks a coordinate.
     for (here, there) in [(0, 1), (1, 0)] {
         let names = motions[here].iter().map(|(name, _)| name.as_str());
-        let alone: Vec<&str> = names
-            .filter(|name| place(&motions[there], name).is_none())
-            .collect();
+        let alone: Vec<&str> = names.filter(|name| place(&motions[there], name).is_none()).collect();
         if !alone.is_empty() {
             return Err(Error::input(format!(
                 "{} has no active {} {}, but {} has: two models are compared along one motion of \
                  the same coordinates; give them the same names in both files",
                 models[there].path,
-                if alone.len() == 1 {
-                    "coordinate"
-                } else {
-                    "coordinates"
-                },
+                if alone.len() == 1 { "coordinate" } else { "coordinates" },
                 alone.join(", "),
                 models[here].path
             )));

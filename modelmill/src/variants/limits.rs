@@ -6,7 +6,7 @@ use super::thresholds::LIMIT_TOLERANCE;
 use crate::error::{Error, Outcome};
 use crate::excite::plant::{AXES, ModelPlant, used_fraction};
 use crate::model::Model;
-use crate::stretch::{BLOCK, RecordingSegment};
+use crate::segment::{BLOCK, RecordingSegment};
 
 /// The state of a limit in two models.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,19 +130,15 @@ impl VariantLimits {
             for start in (0..samples).step_by(BLOCK) {
                 let end = (start + BLOCK).min(samples);
                 job.step(end - start)?;
-                let piece =
-                    |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
+                let piece = |all: &[Vec<f64>]| all.iter().map(|one| one[start..end].to_vec()).collect();
                 let motion = ExcitationMotion {
                     q: piece(&run.q),
                     qd: piece(&run.qd),
                     qdd: piece(&run.qdd),
                 };
-                let excess = plant.excess(&motion).ok_or_else(|| {
-                    Error::input(format!(
-                        "{} cannot follow the motion of {}",
-                        model.path, run.file
-                    ))
-                })?;
+                let excess = plant
+                    .excess(&motion)
+                    .ok_or_else(|| Error::input(format!("{} cannot follow the motion of {}", model.path, run.file)))?;
                 for (most, excess) in most.iter_mut().zip(excess) {
                     *most = excess.into_iter().fold(*most, f64::max);
                 }

@@ -15,7 +15,7 @@ use crate::compare;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 use counterparts::ModelCounterparts;
 use effort::EffortSums;
@@ -95,10 +95,7 @@ impl VariantComparison {
     ///
     /// Fails when the models do not have the same active coordinates, have no drive in common, or cannot follow
     /// a motion.
-    pub fn along_recordings(
-        models: [&Model; 2],
-        runs: [&[&PreparedRecording]; 2],
-    ) -> Outcome<Self> {
+    pub fn along_recordings(models: [&Model; 2], runs: [&[&PreparedRecording]; 2]) -> Outcome<Self> {
         // Stage 1: assign coordinates and drives, and collect notes of both models.
         let counterparts = ModelCounterparts::match_models(models)?;
         let stretches = |runs: &[&PreparedRecording]| -> Vec<RecordingSegment> {
@@ -141,10 +138,7 @@ impl VariantComparison {
             terms.add(models, &own, &counterparts.drives, &rest)?;
             limits.add(models, &own, [&forces[0], &forces[1]])?;
             samples += time.len();
-            seconds += time
-                .last()
-                .zip(time.first())
-                .map_or(0.0, |(end, start)| end - start);
+            seconds += time.last().zip(time.first()).map_or(0.0, |(end, start)| end - start);
         }
         // Stage 3: the results of each drive.
         let drives = (counterparts.drives.iter().enumerate()).map(|(k, [d, _])| {
@@ -197,20 +191,13 @@ fn forces_of(model: &Model, states: &RecordingSegment) -> Outcome<Vec<Vec<f64>>>
     along::forces(model, states, &model.nominal).map_err(|error| match error {
         Error::Cancelled => error,
         // The error names the model, since the recording does not show which of both cannot follow.
-        error => Error::input(message!(
-            "{} cannot follow the motion: {}",
-            model.path,
-            error.message()
-        )),
+        error => Error::input(message!("{} cannot follow the motion: {}", model.path, error.message())),
     })
 }
 
 /// The note on effects that depend on the load, and on the load that they use; `None` without such effects.
 fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
-    let mut effects: Vec<&str> = models
-        .iter()
-        .flat_map(|m| m.load_dependent_effects())
-        .collect();
+    let mut effects: Vec<&str> = models.iter().flat_map(|m| m.load_dependent_effects()).collect();
     // Both models may have the same effect.
     effects.sort_unstable();
     effects.dedup();

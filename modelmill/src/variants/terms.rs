@@ -16,7 +16,7 @@ use modelmill_codegen::{ModelEvaluator, PoseFault, review};
 use super::thresholds::CAUSE_LEAST_SHARE;
 use crate::error::{Error, Outcome};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// The share of a product of parameters in a difference of forces, over all base parameters that contain it. Unlike
 /// the share of a single summand, it does not depend on which columns are retained.
@@ -129,10 +129,7 @@ impl SummandColumns {
             let sums = &mut self.inner[m];
             sums.resize(pairs.len(), vec![0.0; n]);
             let evaluator = ModelEvaluator::new(&model.derivation);
-            let what = format!(
-                "finding the causes of the difference along {}",
-                states[m].run.file
-            );
+            let what = format!("finding the causes of the difference along {}", states[m].run.file);
             let mut start = 0;
             model.host().run_job(&what, states[m].samples(), |job| {
                 states[m].for_each_block(model, |block| {
@@ -158,12 +155,7 @@ impl SummandColumns {
 
     /// The shares for a pair of drives, the largest first; `squares` is the sum of squares of the difference, not
     /// 0.
-    pub(super) fn shares(
-        &self,
-        models: [&Model; 2],
-        pair: usize,
-        squares: f64,
-    ) -> Vec<ProductShare> {
+    pub(super) fn shares(&self, models: [&Model; 2], pair: usize, squares: f64) -> Vec<ProductShare> {
         let mut products: Vec<ProductShare> = Vec::new();
         for slot in &self.slots {
             let [before, after] = [0, 1].map(|m| {
@@ -204,8 +196,7 @@ impl SummandColumns {
             }
         }
         for one in &mut products {
-            one.terms
-                .sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
+            one.terms.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
         }
         products.sort_by(|a, b| b.share.abs().total_cmp(&a.share.abs()));
         products
@@ -232,9 +223,7 @@ impl SummandPair {
     /// The unit of its base parameter.
     fn unit(&self, models: [&Model; 2]) -> String {
         let last = self.latest_place(models);
-        last.map_or_else(String::new, |(model, place)| {
-            model.base[place.base].unit.clone()
-        })
+        last.map_or_else(String::new, |(model, place)| model.base[place.base].unit.clone())
     }
 }
 
@@ -259,8 +248,7 @@ fn summands(model: &Model, is_whole: &dyn Fn(&str) -> bool) -> Vec<(String, Summ
         }
         // The retained product has the factor 1, the dependent ones those of eq. (6).
         let lines = reduction.dependencies.iter().zip(&factors);
-        let dependent =
-            lines.filter_map(|(line, factors)| Some((line.product, *factors.get(&base)?)));
+        let dependent = lines.filter_map(|(line, factors)| Some((line.product, *factors.get(&base)?)));
         let retained = std::iter::once((reduction.retained[base], 1.0));
         for (product, factor) in retained.chain(dependent) {
             let monomial = &reduction.products[product];

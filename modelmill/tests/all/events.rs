@@ -25,9 +25,7 @@ fn told(model: &Model, name: &str, seed: u64, made: Made) -> Vec<(f64, f64, Stri
 
 /// The arm with a kilogram on a link.
 fn kilogram(link: u64) -> Model {
-    let part = format!(
-        "\n[[part]]\nname = \"push\"\non = \"link{link}\"\nmass = 1\ncentre = [0.03, -0.02, 0.08]\n"
-    );
+    let part = format!("\n[[part]]\nname = \"push\"\non = \"link{link}\"\nmass = 1\ncentre = [0.03, -0.02, 0.08]\n");
     with_part("puma560", &part)
 }
 
@@ -58,10 +56,7 @@ fn pushes_are_told_with_their_times() {
 
 #[test]
 fn nothing_is_told_where_nothing_happened() {
-    for (k, name) in ["puma560", "scara", "five_bar", "spidermill"]
-        .iter()
-        .enumerate()
-    {
+    for (k, name) in ["puma560", "scara", "five_bar", "spidermill"].iter().enumerate() {
         let model = Model::open(bundled(name)).expect("the model");
         for seed in 0..5 {
             let events = told(&model, name, 900 + 10 * k as u64 + seed, Made::Nothing);

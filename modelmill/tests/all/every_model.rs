@@ -54,13 +54,7 @@ fn motion(mechanism: &Mechanism, reach: f64) -> Moving {
         }
     }
     // Quaternions have a length of one, and their scalar parts no rates.
-    let active = || {
-        mechanism
-            .coordinates
-            .iter()
-            .filter(|c| !c.passive)
-            .enumerate()
-    };
+    let active = || mechanism.coordinates.iter().filter(|c| !c.passive).enumerate();
     let quaternion: Vec<usize> = active()
         .filter(|(_, c)| c.motion.is_quaternion())
         .map(|(i, _)| i)
@@ -197,10 +191,7 @@ fn check(name: &str, path: &Path) {
     let fit = relative(&identified.fit);
     // Base parameters take a little of the noise along.
     assert!((0.7 * NOISE..1.05 * NOISE).contains(&fit), "{name}: {fit}");
-    assert!(
-        identified.condition_number.is_none_or(f64::is_finite),
-        "{name}"
-    );
+    assert!(identified.condition_number.is_none_or(f64::is_finite), "{name}");
 
     let values: Vec<f64> = identified.parameters.iter().map(|p| p.value).collect();
     let nrms = |values: &[f64]| -> f64 {
@@ -208,44 +199,24 @@ fn check(name: &str, path: &Path) {
         relative(&compared.unwrap_or_else(|e| fault(e)).figures)
     };
     let compared = nrms(&values);
-    assert!(
-        (compared / fit - 1.0).abs() < 1e-6,
-        "{name}: {compared} and {fit}"
-    );
+    assert!((compared / fit - 1.0).abs() < 1e-6, "{name}: {compared} and {fit}");
     let nominal = nrms(&model.nominal);
     if has_values {
-        assert!(
-            (0.8 * NOISE..1.05 * NOISE).contains(&nominal),
-            "{name}: {nominal}"
-        );
+        assert!((0.8 * NOISE..1.05 * NOISE).contains(&nominal), "{name}: {nominal}");
     } else {
         assert!(nominal.is_finite(), "{name}");
     }
 
     let found = model.diagnose(&[&run], &[], &DiagnosisOptions::default());
     let diagnosis = found.unwrap_or_else(|e| fault(e)).diagnosis;
-    let effects: Vec<_> = diagnosis
-        .effects
-        .iter()
-        .map(|found| &found.effect)
-        .collect();
-    assert_eq!(
-        diagnosis.verdict,
-        DiagnosisVerdict::Adequate,
-        "{name}: {effects:?}"
-    );
+    let effects: Vec<_> = diagnosis.effects.iter().map(|found| &found.effect).collect();
+    assert_eq!(diagnosis.verdict, DiagnosisVerdict::Adequate, "{name}: {effects:?}");
     assert!(effects.is_empty(), "{name}: {effects:?}");
     for error in [diagnosis.steps[0].fit, diagnosis.steps[0].check] {
-        assert!(
-            (0.7 * NOISE..1.3 * NOISE).contains(&error),
-            "{name}: {error}"
-        );
+        assert!((0.7 * NOISE..1.3 * NOISE).contains(&error), "{name}: {error}");
     }
     let floor = diagnosis.noise_floor;
-    assert!(
-        (0.7 * NOISE..1.3 * NOISE).contains(&floor),
-        "{name}: {floor}"
-    );
+    assert!((0.7 * NOISE..1.3 * NOISE).contains(&floor), "{name}: {floor}");
 }
 
 macro_rules! every {

@@ -53,9 +53,7 @@ pub(crate) enum Made<'a> {
 #[track_caller]
 pub(crate) fn run(name: &str, seed: u64, made: Made) -> PathBuf {
     let model = match made {
-        Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) => {
-            with_part(name, part)
-        }
+        Made::Body(part) | Made::BodyAndFriction(part, ..) | Made::BodyAndScales(part, _) => with_part(name, part),
         _ => Model::open(bundled(name)).expect("the model"),
     };
     run_of(&model, name, seed, made)
@@ -74,21 +72,11 @@ fn reach(derivation: &Derivation, coordinate: &JointCoordinate) -> f64 {
     } else {
         0.3
     };
-    wide * if coordinate.motion.is_angle() {
-        0.35
-    } else {
-        0.1
-    }
+    wide * if coordinate.motion.is_angle() { 0.35 } else { 0.1 }
 }
 
 /// Adds so many times what a model weighs more than another.
-fn push(
-    forces: &mut [Vec<f64>],
-    with: &[Vec<f64>],
-    without: &[Vec<f64>],
-    times: f64,
-    when: Range<usize>,
-) {
+fn push(forces: &mut [Vec<f64>], with: &[Vec<f64>], without: &[Vec<f64>], times: f64, when: Range<usize>) {
     for (d, force) in forces.iter_mut().enumerate() {
         for k in when.clone() {
             force[k] += times * (with[d][k] - without[d][k]);
@@ -143,9 +131,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
             }
         }
     }
-    let [q, qd, qdd]: [Vec<&[f64]>; 3] = columns
-        .each_ref()
-        .map(|all| all.iter().map(Vec::as_slice).collect());
+    let [q, qd, qdd]: [Vec<&[f64]>; 3] = columns.each_ref().map(|all| all.iter().map(Vec::as_slice).collect());
     let at_rest = MotionStates {
         q: q.clone(),
         qd: vec![&[0.0; SAMPLES]; active.len()],
@@ -159,9 +145,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         load: Vec::new(),
     };
     let evaluator = ModelEvaluator::new(&model.derivation);
-    let mut forces = evaluator
-        .inverse_dynamics(&states, &model.nominal)
-        .expect("forces");
+    let mut forces = evaluator.inverse_dynamics(&states, &model.nominal).expect("forces");
     if let Made::Push(pushed, times, from, to) = made {
         let [with, without] = [pushed, model].map(|model| {
             let evaluator = ModelEvaluator::new(&model.derivation);
@@ -181,10 +165,7 @@ pub(crate) fn run_of(model: &Model, name: &str, seed: u64, made: Made) -> PathBu
         let rate = &motion[drives.len() + d];
         for (f, rate) in force.iter_mut().zip(rate) {
             match made {
-                Made::Friction(drive, dry, viscous)
-                | Made::BodyAndFriction(_, drive, dry, viscous)
-                    if drive == d =>
-                {
+                Made::Friction(drive, dry, viscous) | Made::BodyAndFriction(_, drive, dry, viscous) if drive == d => {
                     *f += dry * rate.signum() + viscous * rate;
                 }
                 Made::Scale(drive, factor) if drive == d => *f *= factor,

@@ -5,9 +5,7 @@
 use std::path::Path;
 
 use modelmill::Model;
-use modelmill::diagnose::{
-    DiagnosisFindings, DiagnosisOptions, DiagnosisVerdict, FixedParameters, MissingEffect,
-};
+use modelmill::diagnose::{DiagnosisFindings, DiagnosisOptions, DiagnosisVerdict, FixedParameters, MissingEffect};
 use modelmill::identify::EstimatorOptions;
 use modelmill::recording::RecordingOptions;
 
@@ -91,12 +89,7 @@ fn a_gear_that_yields_is_found_with_its_compliance() {
     let file = run(ARM, 730, Made::Yields(1, 4e-4));
     let findings = diagnosed(&file, FixedParameters::All);
     let drive = findings.channels()[1].clone();
-    near(
-        only(&findings, "drive_compliance", &drive),
-        "compliance",
-        4e-4,
-        0.2,
-    );
+    near(only(&findings, "drive_compliance", &drive), "compliance", 4e-4, 0.2);
 }
 
 /// A zero is a fault of the recording: the model lacks nothing. Beside free base parameters only joints behind it tell.
@@ -146,10 +139,7 @@ fn friction_of_another_day_is_no_further_friction() {
     let [change] = &changes[..] else {
         panic!("{:#?}", findings.diagnosis.disturbances);
     };
-    assert_eq!(
-        (change.kind.as_str(), &change.at),
-        ("different_runs", &vec![drive])
-    );
+    assert_eq!((change.kind.as_str(), &change.at), ("different_runs", &vec![drive]));
     for (name, truth) in [("change of Fc", 3.0), ("change of Fv", 4.0)] {
         let value = change.estimates.iter().find(|one| one.name == name);
         let value = value.expect("an estimate").value;
@@ -191,9 +181,7 @@ fn what_a_fit_does_not_know_is_no_error_of_the_model() {
     };
     let asked = |file: &Path| {
         let recording = read(file);
-        fitted
-            .diagnose(&[&recording], &[], &question)
-            .expect("an answer")
+        fitted.diagnose(&[&recording], &[], &question).expect("an answer")
     };
     let same = asked(&run(ARM, 741, Made::Nothing));
     assert!(same.missing.is_empty(), "{:#?}", same.missing);
@@ -211,9 +199,8 @@ fn what_turns_the_sign_of_bodies_is_suspected() {
     let suspicions = |text: &str| -> Vec<String> {
         let model = Model::from_text("spidermill.toml", text).expect("a model");
         let runs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recordings/spidermill-mbs");
-        let recording = |name: &str| {
-            (model.recording(runs.join(name), &RecordingOptions::default())).expect("a recording")
-        };
+        let recording =
+            |name: &str| (model.recording(runs.join(name), &RecordingOptions::default())).expect("a recording");
         let question = DiagnosisOptions {
             fixed: FixedParameters::Known,
             repeat_with_nominal: false,
@@ -222,15 +209,11 @@ fn what_turns_the_sign_of_bodies_is_suspected() {
         let found = model.diagnose(&[&fit], &[&check], &question);
         let notes = found.expect("an answer").notes.into_iter();
         let says = notes.map(|note| note.says.in_library_words());
-        says.filter(|says| says.contains("no bodies near"))
-            .collect()
+        says.filter(|says| says.contains("no bodies near")).collect()
     };
     assert!(suspicions(&text).is_empty());
     let turned = text.replace("[0, \"-g\", 0]", "[0, \"g\", 0]");
     assert_ne!(turned, text);
     let says = suspicions(&turned);
-    assert!(
-        says.len() == 1 && says[0].starts_with("p1_min comes out"),
-        "{says:?}"
-    );
+    assert!(says.len() == 1 && says[0].starts_with("p1_min comes out"), "{says:?}");
 }

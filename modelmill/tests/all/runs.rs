@@ -7,8 +7,7 @@ use modelmill::Model;
 use modelmill::print::LibrarySpelling;
 use modelmill::recording::{PreparedRecording, RecordingOptions};
 use modelmill::runs::{
-    ChangeEstimate, KnownLoad, PerRunSelection, PhysicalChange, RunChange, RunsComparison,
-    RunsOptions, UnreadRun,
+    ChangeEstimate, KnownLoad, PerRunSelection, PhysicalChange, RunChange, RunsComparison, RunsOptions, UnreadRun,
 };
 
 use crate::made::{Made, bundled, run};
@@ -45,10 +44,7 @@ fn is_near(found: &ChangeEstimate, truth: f64, part: f64) {
 
 #[test]
 fn nothing_is_told_where_nothing_changed() {
-    for (k, name) in ["puma560", "scara", "five_bar", "spidermill"]
-        .iter()
-        .enumerate()
-    {
+    for (k, name) in ["puma560", "scara", "five_bar", "spidermill"].iter().enumerate() {
         let found = told(name, 100 + 2 * k as u64, Made::Nothing);
         assert!(found.is_empty(), "{name}: {found:#?}");
     }
@@ -89,9 +85,7 @@ fn a_load_in_a_loop_is_told_where_it_is() {
     let mechanism = &model.derivation.mechanism;
     let part = mechanism.parts.last().expect("a part");
     let last = mechanism.frames[part.frame.0].name.clone();
-    let part = format!(
-        "\n[[part]]\nname = \"tool\"\non = \"{last}\"\nlinear = {{ MX = 0.5, MY = 0.2, ZZ = 0.3 }}\n"
-    );
+    let part = format!("\n[[part]]\nname = \"tool\"\non = \"{last}\"\nlinear = {{ MX = 0.5, MY = 0.2, ZZ = 0.3 }}\n");
     let found = told("five_bar", 400, Made::Body(&part));
     let [
         RunChange {
@@ -112,13 +106,9 @@ fn drives_and_clocks_are_told_apart() {
     let found = told("scara", 500, Made::Friction(1, 0.6, 0.3));
     let [
         RunChange {
-            change:
-                PhysicalChange::Friction {
-                    drive,
-                    dry,
-                    viscous,
-                    ..
-                },
+            change: PhysicalChange::Friction {
+                drive, dry, viscous, ..
+            },
             ..
         },
     ] = &found[..]
@@ -195,8 +185,7 @@ fn one_run_alone_is_refused() {
     let one = model
         .recording(&file, &RecordingOptions::default())
         .expect("the recording");
-    let runs =
-        |all: Vec<Result<&PreparedRecording, UnreadRun>>| model.runs(all, &RunsOptions::default());
+    let runs = |all: Vec<Result<&PreparedRecording, UnreadRun>>| model.runs(all, &RunsOptions::default());
     let error = runs(vec![Ok(&one)]).err().expect("a refusal");
     assert!(error.to_string().contains("two or more"), "{error}");
     // A run that cannot be read is no reason to fail, unless nothing is left.
@@ -210,10 +199,7 @@ fn one_run_alone_is_refused() {
     assert!(error.to_string().contains("nowhere.csv"), "{error}");
     let found = runs(vec![Ok(&one), unread(), Ok(&one)]).expect("an answer");
     assert_eq!((found.runs.len(), found.unread.len()), (2, 1));
-    assert_eq!(
-        found.json(&LibrarySpelling)["unread"][0]["file"],
-        "nowhere.csv"
-    );
+    assert_eq!(found.json(&LibrarySpelling)["unread"][0]["file"], "nowhere.csv");
 }
 
 const TOOL: &str = "\n[[part]]\nname = \"tool\"\non = \"link6\"\nmass = 2.8\ncentre = [0.03, -0.02, 0.08]\n\
@@ -236,16 +222,11 @@ fn a_push_is_told_with_its_times() {
     else {
         panic!("{found:#?}");
     };
-    assert!(
-        (from - 9.0).abs() < 0.3 && (to - 10.0).abs() < 0.3,
-        "{found:#?}"
-    );
+    assert!((from - 9.0).abs() < 0.3 && (to - 10.0).abs() < 0.3, "{found:#?}");
     let model = Model::open(bundled("puma560")).expect("the model");
     let names = model.drives();
     assert!(
-        drives
-            .iter()
-            .all(|(drive, _)| [&names[1], &names[2]].contains(&drive)),
+        drives.iter().all(|(drive, _)| [&names[1], &names[2]].contains(&drive)),
         "{drives:?}"
     );
 }
@@ -306,10 +287,7 @@ fn what_is_each_runs_own_is_told_in_one_fit() {
         per_run: vec![parse("payload@nowhere")],
         loads: Vec::new(),
     };
-    let error = model
-        .runs([Ok(&a), Ok(&b)], &asked)
-        .err()
-        .expect("a refusal");
+    let error = model.runs([Ok(&a), Ok(&b)], &asked).err().expect("a refusal");
     assert!(error.to_string().contains("link6"), "{error}");
 }
 
@@ -332,11 +310,7 @@ fn a_known_load_tells_the_scales_of_all_forces() {
         per_run: Vec::new(),
         loads: vec![KnownLoad::parse(text).expect("a load")],
     };
-    let found = held(
-        &model,
-        &[&bare, &loaded],
-        &load("runs-puma560-1401.csv=2.8@link6"),
-    );
+    let found = held(&model, &[&bare, &loaded], &load("runs-puma560-1401.csv=2.8@link6"));
     let fit = found.shared.expect("a fit");
     for ((drive, gain), scale) in fit.gains.iter().zip(scales) {
         let deviation = gain.deviation.expect("a deviation");
@@ -366,9 +340,7 @@ fn what_changed_and_stayed_is_told_with_its_run() {
             .recording(file, &RecordingOptions::default())
             .expect("the recording"))
     });
-    let found = model
-        .runs(recordings, &RunsOptions::default())
-        .expect("an answer");
+    let found = model.runs(recordings, &RunsOptions::default()).expect("an answer");
     let [point] = &found.points[..] else {
         panic!("{:#?}", found.points);
     };

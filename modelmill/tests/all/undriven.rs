@@ -124,11 +124,7 @@ joint = "q1"
 name = "elbow"
 joint = "q2"
 "#,
-        if order.starts_with("\"qw") {
-            "wxyz"
-        } else {
-            "xyzw"
-        }
+        if order.starts_with("\"qw") { "wxyz" } else { "xyzw" }
     )
 }
 
@@ -152,8 +148,7 @@ struct Plant<'a> {
 impl Plant<'_> {
     fn accelerations(&self, q: &[f64], qd: &[f64], forces: &[f64]) -> Vec<f64> {
         let still = vec![0.0; q.len()];
-        let one =
-            |values: &'_ [f64]| -> Vec<Vec<f64>> { values.iter().map(|x| vec![*x]).collect() };
+        let one = |values: &'_ [f64]| -> Vec<Vec<f64>> { values.iter().map(|x| vec![*x]).collect() };
         let (q, qd, qdd, load) = (one(q), one(qd), one(&still), one(forces));
         let slices = |all: &'_ [Vec<f64>]| -> Vec<Vec<f64>> { all.to_vec() };
         let (q, qd, qdd, load) = (slices(&q), slices(&qd), slices(&qdd), slices(&load));
@@ -255,20 +250,11 @@ fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
     let mut q: Vec<f64> = mechanism.coordinates.iter().map(|c| c.nominal).collect();
     let mut qd = vec![0.0; q.len()];
     if let Some(body) = body {
-        for (k, i) in body
-            .position
-            .iter()
-            .chain(&body.quaternion[1..])
-            .enumerate()
-        {
+        for (k, i) in body.position.iter().chain(&body.quaternion[1..]).enumerate() {
             qd[i.0] = 0.3 * (k as f64 - 2.0);
         }
     }
-    let names: Vec<&str> = mechanism
-        .coordinates
-        .iter()
-        .map(|c| c.name.as_str())
-        .collect();
+    let names: Vec<&str> = mechanism.coordinates.iter().map(|c| c.name.as_str()).collect();
     let driven: Vec<usize> = (0..mechanism.drives.len())
         .filter(|d| mechanism.drives[*d].is_driven)
         .collect();
@@ -281,33 +267,19 @@ fn recording(model: &Model, name: &str, made: &Made) -> PathBuf {
         let _ = write!(text, "\n{t}");
         for (i, value) in q.iter().enumerate() {
             let turned = k % 2 == 1 && mechanism.coordinates[i].motion.is_quaternion();
-            let read = made
-                .step
-                .map_or(*value, |step| (value / step).round() * step);
+            let read = made.step.map_or(*value, |step| (value / step).round() * step);
             let _ = write!(text, ",{}", if turned { -read } else { read });
         }
         let forces = |t: f64| -> Vec<f64> { (0..waves.len()).map(|d| force(d, t)).collect() };
         for d in &driven {
             let _ = write!(text, ",{}", force(*d, t) + NOISE * push * draws.normal());
         }
-        let slope = |q: &[f64], qd: &[f64], t: f64| {
-            (plant.poses(q, qd), plant.accelerations(q, qd, &forces(t)))
-        };
-        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> {
-            x.iter().zip(by).map(|(x, d)| x + h * d).collect()
-        };
+        let slope = |q: &[f64], qd: &[f64], t: f64| (plant.poses(q, qd), plant.accelerations(q, qd, &forces(t)));
+        let moved = |x: &[f64], by: &[f64], h: f64| -> Vec<f64> { x.iter().zip(by).map(|(x, d)| x + h * d).collect() };
         let h = STEP;
         let a = slope(&q, &qd, t);
-        let b = slope(
-            &moved(&q, &a.0, h / 2.0),
-            &moved(&qd, &a.1, h / 2.0),
-            t + h / 2.0,
-        );
-        let c = slope(
-            &moved(&q, &b.0, h / 2.0),
-            &moved(&qd, &b.1, h / 2.0),
-            t + h / 2.0,
-        );
+        let b = slope(&moved(&q, &a.0, h / 2.0), &moved(&qd, &a.1, h / 2.0), t + h / 2.0);
+        let c = slope(&moved(&q, &b.0, h / 2.0), &moved(&qd, &b.1, h / 2.0), t + h / 2.0);
         let d = slope(&moved(&q, &c.0, h), &moved(&qd, &c.1, h), t + h);
         for i in 0..q.len() {
             q[i] += h / 6.0 * (a.0[i] + 2.0 * b.0[i] + 2.0 * c.0[i] + d.0[i]);
@@ -366,24 +338,9 @@ fn an_arm_on_a_free_body_is_identified_in_any_axes() {
     let scalar_last = "qx = {}\nqy = {}\nqz = {}\nqw = {}";
     let scalar_first = "qw = {}\nqx = {}\nqy = {}\nqz = {}";
     for (name, order, coordinates, twist) in [
-        (
-            "body",
-            "\"qx\", \"qy\", \"qz\", \"qw\"",
-            scalar_last,
-            "body",
-        ),
-        (
-            "mixed",
-            "\"qw\", \"qx\", \"qy\", \"qz\"",
-            scalar_first,
-            "mixed",
-        ),
-        (
-            "world",
-            "\"qx\", \"qy\", \"qz\", \"qw\"",
-            scalar_last,
-            "world",
-        ),
+        ("body", "\"qx\", \"qy\", \"qz\", \"qw\"", scalar_last, "body"),
+        ("mixed", "\"qw\", \"qx\", \"qy\", \"qz\"", scalar_first, "mixed"),
+        ("world", "\"qx\", \"qy\", \"qz\", \"qw\"", scalar_last, "world"),
     ] {
         check(name, &free_arm(order, coordinates, twist), 1.0, 2e-2);
     }
@@ -404,8 +361,7 @@ fn told(name: &str, text: &str, effect: &str, push: f64) -> Vec<(String, Vec<Str
         (model.recording(&file, &RecordingOptions::default())).expect("a recording")
     };
     let (fit, check) = (run(17), run(29));
-    let found =
-        (model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())).expect("a diagnosis");
+    let found = (model.diagnose(&[&fit], &[&check], &DiagnosisOptions::default())).expect("a diagnosis");
     let diagnosis = found.diagnosis;
     let error = diagnosis.steps[0].check;
     assert!(!effect.is_empty() || error < 0.15, "{name}: {error}");
@@ -423,10 +379,7 @@ fn told(name: &str, text: &str, effect: &str, push: f64) -> Vec<(String, Vec<Str
 /// Of a joint that nothing drives no force is read: zeros say nothing of a gain, and do not count more than all else.
 #[test]
 fn nothing_is_missing_where_a_joint_has_no_drive() {
-    for (name, text, push) in [
-        ("pendubot-told", PENDUBOT, 1.0),
-        ("cart_pole-told", CART_POLE, 3.0),
-    ] {
+    for (name, text, push) in [("pendubot-told", PENDUBOT, 1.0), ("cart_pole-told", CART_POLE, 3.0)] {
         assert_eq!(told(name, text, "", push), []);
     }
 }
@@ -440,10 +393,7 @@ at = ["motor"]
 parameters = { Fv = { name = "Fv", nominal = 1.5 } }
 "#;
     let found = told("cart_pole-rubs", CART_POLE, friction, 3.0);
-    assert_eq!(
-        found,
-        [("viscous_friction".to_owned(), vec!["motor".to_owned()])]
-    );
+    assert_eq!(found, [("viscous_friction".to_owned(), vec!["motor".to_owned()])]);
 }
 
 const CABLES: &str = r#"
@@ -521,23 +471,17 @@ fn cables_are_more_than_freedoms() {
     let (samples, step) = (1500, 0.004);
     let motion = |k: usize, order: usize| -> [f64; 3] {
         let t = step * k as f64;
-        [(1.0, 0.4, 2.3), (0.7, 0.25, 3.1), (0.0, 0.5, 4.7)].map(
-            |(at, size, rate): (f64, f64, f64)| {
-                let (sin, cos) = (rate * t).sin_cos();
-                match order {
-                    0 => at + size * sin,
-                    1 => size * rate * cos,
-                    _ => -size * rate * rate * sin,
-                }
-            },
-        )
+        [(1.0, 0.4, 2.3), (0.7, 0.25, 3.1), (0.0, 0.5, 4.7)].map(|(at, size, rate): (f64, f64, f64)| {
+            let (sin, cos) = (rate * t).sin_cos();
+            match order {
+                0 => at + size * sin,
+                1 => size * rate * cos,
+                _ => -size * rate * rate * sin,
+            }
+        })
     };
-    let column = |order: usize, i: usize| -> Vec<f64> {
-        (0..samples).map(|k| motion(k, order)[i]).collect()
-    };
-    let columns: Vec<Vec<Vec<f64>>> = (0..3)
-        .map(|o| (0..3).map(|i| column(o, i)).collect())
-        .collect();
+    let column = |order: usize, i: usize| -> Vec<f64> { (0..samples).map(|k| motion(k, order)[i]).collect() };
+    let columns: Vec<Vec<Vec<f64>>> = (0..3).map(|o| (0..3).map(|i| column(o, i)).collect()).collect();
     let slices = |o: usize| -> Vec<&[f64]> { columns[o].iter().map(Vec::as_slice).collect() };
     let states = MotionStates {
         q: slices(0),
@@ -597,18 +541,12 @@ fn cables_are_more_than_freedoms() {
     }
 
     // Beside a variant, figures are those of the rows.
-    let found = VariantComparison::along_recordings(
-        [&model, &model.clone()],
-        [&[&recording], &[&recording]],
-    )
-    .expect("figures");
+    let found =
+        VariantComparison::along_recordings([&model, &model.clone()], [&[&recording], &[&recording]]).expect("figures");
     let drives: Vec<&str> = found.drives.iter().map(|one| &*one.drive).collect();
     assert_eq!(drives, model.drives());
     assert!(
-        found.notes[0]
-            .says
-            .in_library_words()
-            .contains("more drives than"),
+        found.notes[0].says.in_library_words().contains("more drives than"),
         "{:?}",
         found.notes
     );

@@ -66,11 +66,7 @@ const STEP: f64 = 0.01;
 fn swing(middle: f64, size: f64, times: f64, k: usize) -> [f64; 3] {
     let rate = TAU * times / (SAMPLES as f64 * STEP);
     let (sin, cos) = (rate * STEP * k as f64).sin_cos();
-    [
-        middle + size * sin,
-        size * rate * cos,
-        -size * rate * rate * sin,
-    ]
+    [middle + size * sin, size * rate * cos, -size * rate * rate * sin]
 }
 
 fn states(k: usize) -> [[f64; 3]; 2] {
@@ -114,8 +110,7 @@ fn along(before: &Model, after: &Model, file: &Path) -> VariantComparison {
             .expect("a recording")
     };
     let (first, second): (PreparedRecording, PreparedRecording) = (read(before), read(after));
-    VariantComparison::along_recordings([before, after], [&[&first], &[&second]])
-        .expect("both along the motion")
+    VariantComparison::along_recordings([before, after], [&[&first], &[&second]]).expect("both along the motion")
 }
 
 #[track_caller]
@@ -167,11 +162,7 @@ fn a_heavier_tool_costs_what_its_closed_form_says() {
         close(drive.difference.peak, peak, 1e-9);
         // One product makes it all, by its value alone: geometry is the same.
         shares_add_up(drive);
-        let names: Vec<&str> = drive
-            .products
-            .iter()
-            .map(|one| one.product.as_str())
-            .collect();
+        let names: Vec<&str> = drive.products.iter().map(|one| one.product.as_str()).collect();
         assert_eq!(names, ["mP"]);
         for term in &drive.products[0].terms {
             close(term.by_value, term.share, 1e-9);
@@ -182,14 +173,8 @@ fn a_heavier_tool_costs_what_its_closed_form_says() {
     let mut names: Vec<&str> = terms.iter().map(|term| term.term.as_str()).collect();
     names.sort_unstable();
     assert_eq!(names, ["LB*mP", "LB^2*mP"]);
-    let moment = terms
-        .iter()
-        .find(|term| term.term == "LB*mP")
-        .expect("it is there");
-    assert_eq!(
-        (moment.retained.as_str(), moment.unit.as_str()),
-        ("MX2", "kg m")
-    );
+    let moment = terms.iter().find(|term| term.term == "LB*mP").expect("it is there");
+    assert_eq!((moment.retained.as_str(), moment.unit.as_str()), ("MX2", "kg m"));
     close(moment.before.expect("a value"), 4.0, 1e-12);
     close(moment.after.expect("a value"), 36.0, 1e-12);
 }
@@ -199,10 +184,7 @@ fn a_heavier_tool_costs_what_its_closed_form_says() {
 fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
     let (before, after) = (
         arm(&[]),
-        arm(&[
-            ("nominal = 5.0", "nominal = 45.0"),
-            ("MX = 0.42", "MX = 0.9"),
-        ]),
+        arm(&[("nominal = 5.0", "nominal = 45.0"), ("MX = 0.42", "MX = 0.9")]),
     );
     let file = recording("projection", &[]);
     let found = along(&before, &after, &file);
@@ -227,11 +209,7 @@ fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
             let mut values = before.nominal.clone();
             values[k] += term.after.expect("a value") - term.before.expect("a value");
             let part = forces(&values);
-            let inner = part[d]
-                .iter()
-                .zip(&first[d])
-                .zip(&whole)
-                .map(|((b, a), r)| (b - a) * r);
+            let inner = part[d].iter().zip(&first[d]).zip(&whole).map(|((b, a), r)| (b - a) * r);
             close(term.share, inner.sum::<f64>() / squares, 1e-7);
             seen += 1;
         }
@@ -244,18 +222,12 @@ fn a_share_is_what_the_summand_alone_projects_on_the_difference() {
 fn figures_are_those_of_evaluated_forces() {
     let (before, after) = (
         arm(&[]),
-        arm(&[
-            ("ZZ = 0.35", "ZZ = 3.5"),
-            ("LA = { value = 0.6", "LA = { value = 0.7"),
-        ]),
+        arm(&[("ZZ = 0.35", "ZZ = 3.5"), ("LA = { value = 0.6", "LA = { value = 0.7")]),
     );
     let file = recording("figures", &[]);
     let found = along(&before, &after, &file);
     for (model, pick) in [
-        (
-            &before,
-            (|one: &DriveVariants| one.before) as fn(&DriveVariants) -> _,
-        ),
+        (&before, (|one: &DriveVariants| one.before) as fn(&DriveVariants) -> _),
         (&after, |one: &DriveVariants| one.after),
     ] {
         let forces = model
@@ -284,10 +256,7 @@ fn figures_are_those_of_evaluated_forces() {
     }
     let json = found.json(&LibrarySpelling);
     let first = &json["drives"][0];
-    assert_eq!(
-        first["after"]["peak"].as_f64(),
-        Some(found.drives[0].after.peak)
-    );
+    assert_eq!(first["after"]["peak"].as_f64(), Some(found.drives[0].after.peak));
     assert_eq!(
         first["difference"]["rms"].as_f64(),
         Some(found.drives[0].difference.rms)
@@ -297,7 +266,8 @@ fn figures_are_those_of_evaluated_forces() {
 /// A machine without friction gets back all the work that it was given, once it is where it began; one with friction keeps some.
 #[test]
 fn a_closed_motion_takes_no_net_work_without_friction() {
-    let friction = "\n[[effect]]\nkind = \"viscous_friction\"\nat = [\"boom\"]\nparameters = { Fv = { nominal = 2.5 } }\n";
+    let friction =
+        "\n[[effect]]\nkind = \"viscous_friction\"\nat = [\"boom\"]\nparameters = { Fv = { nominal = 2.5 } }\n";
     let before = arm(&[]);
     let after = Model::from_text("worn.toml", &format!("{ARM}{friction}")).expect("a model");
     let found = along(&before, &after, &recording("energy", &[]));
@@ -321,9 +291,7 @@ fn limits_tell_what_the_variant_exceeds() {
     let found = along(&before, &after, &recording("limits", &[]));
     let of = |name: &str| {
         let mut limits = found.limits.iter();
-        limits
-            .find(|one| one.limit == name)
-            .unwrap_or_else(|| panic!("{name}"))
+        limits.find(|one| one.limit == name).unwrap_or_else(|| panic!("{name}"))
     };
     assert_eq!(found.limits.len(), 4);
     assert_eq!(of("shoulder").crossing(), LimitCrossing::NowExceeded);
@@ -342,13 +310,7 @@ fn limits_tell_what_the_variant_exceeds() {
         ("boom = { force = 100 }", ""),
     ]);
     let found = along(&after, &strong, &recording("limits", &[]));
-    let of = |name: &str| {
-        found
-            .limits
-            .iter()
-            .find(|one| one.limit == name)
-            .expect("a limit")
-    };
+    let of = |name: &str| found.limits.iter().find(|one| one.limit == name).expect("a limit");
     assert_eq!(of("shoulder").crossing(), LimitCrossing::NoLongerExceeded);
     assert_eq!(of("boom").crossing(), LimitCrossing::NoLongerExceeded);
     assert_eq!((of("boom").used[1], of("boom").ranges[1]), (None, None));
@@ -358,8 +320,7 @@ fn limits_tell_what_the_variant_exceeds() {
 #[test]
 fn other_columns_are_told_apart_and_errors_are_those_of_compare() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let open =
-        |name: &str| Model::open(root.join("model-spec/models").join(name)).expect("a model");
+    let open = |name: &str| Model::open(root.join("model-spec/models").join(name)).expect("a model");
     let (before, after) = (open("spidermill.toml"), open("spidermill-paper.toml"));
     let file = root.join("recordings/spidermill-mbs/with-rods-check.csv");
     let found = along(&before, &after, &file);
@@ -368,16 +329,8 @@ fn other_columns_are_told_apart_and_errors_are_those_of_compare() {
         shares_add_up(drive);
         assert!(drive.difference.rms > 0.0);
     }
-    let singular = found
-        .limits
-        .iter()
-        .filter(|one| one.limit.starts_with("singularity"));
-    assert!(
-        singular
-            .clone()
-            .all(|one| one.used.iter().all(Option::is_some))
-            && singular.count() == 2
-    );
+    let singular = found.limits.iter().filter(|one| one.limit.starts_with("singularity"));
+    assert!(singular.clone().all(|one| one.used.iter().all(Option::is_some)) && singular.count() == 2);
     for (model, errors) in [&before, &after].into_iter().zip(&found.errors) {
         let run = model
             .recording(&file, &RecordingOptions::default())
@@ -386,9 +339,7 @@ fn other_columns_are_told_apart_and_errors_are_those_of_compare() {
         assert_eq!(errors.as_ref(), Some(&compared.figures));
     }
     // Another length: every column of the loop moves, and shares still add up.
-    let longer = before
-        .text()
-        .replace("d1 = { value = 1.13", "d1 = { value = 1.14");
+    let longer = before.text().replace("d1 = { value = 1.13", "d1 = { value = 1.14");
     let longer = Model::from_text("longer.toml", &longer).expect("a model");
     for drive in &along(&before, &longer, &file).drives {
         shares_add_up(drive);
@@ -409,11 +360,7 @@ fn effects_by_load_need_no_recorded_forces() {
     let after = Model::from_text("worn.toml", &format!("{ARM}{friction}")).expect("a model");
     let found = along(&before, &after, &recording("load", &[]));
     // A tenth of the force itself, whichever way it moves; only at rest there is none.
-    close(
-        found.drives[1].difference.peak,
-        0.1 * found.drives[1].before.peak,
-        0.02,
-    );
+    close(found.drives[1].difference.peak, 0.1 * found.drives[1].before.peak, 0.02);
     assert!(
         found
             .notes
@@ -432,11 +379,7 @@ fn coordinates_may_stand_in_another_order() {
     )]);
     assert_ne!(before.active_coordinates(), turned.active_coordinates());
     for drive in &along(&before, &turned, &recording("order", &[])).drives {
-        assert!(
-            drive.difference.rms < 1e-12 * drive.before.rms,
-            "{}",
-            drive.drive
-        );
+        assert!(drive.difference.rms < 1e-12 * drive.before.rms, "{}", drive.drive);
     }
 }
 
@@ -459,16 +402,9 @@ fn what_has_no_counterpart_is_said() {
         ("shoulder =", "a ="),
         ("boom =", "b ="),
     ]);
-    assert!(
-        says(&unnamed).contains("no drive in common"),
-        "{}",
-        says(&unnamed)
-    );
+    assert!(says(&unnamed).contains("no drive in common"), "{}", says(&unnamed));
     // One drive by another name is left out, with a word.
-    let one = arm(&[
-        ("name = \"boom\"", "name = \"elbow\""),
-        ("boom =", "elbow ="),
-    ]);
+    let one = arm(&[("name = \"boom\"", "name = \"elbow\""), ("boom =", "elbow =")]);
     let found = along(&before, &one, &recording("names", &[]));
     assert_eq!(found.drives.len(), 1);
     let warned: Vec<String> = (found.notes.iter())
@@ -486,10 +422,7 @@ fn what_has_no_counterpart_is_said() {
 #[test]
 fn what_nothing_drives_is_left_out() {
     let loose = arm(&[
-        (
-            "q2 = { nominal = 0.8 }",
-            "q2 = { nominal = 0.8, driven = false }",
-        ),
+        ("q2 = { nominal = 0.8 }", "q2 = { nominal = 0.8, driven = false }"),
         ("[[drive]]\nname = \"boom\"\njoint = \"q2\"\n", ""),
         ("boom = { force = 100 }", ""),
     ]);
@@ -499,10 +432,10 @@ fn what_nothing_drives_is_left_out() {
     let found = along(&loose, &loose.clone(), &recording("loose", &[]));
     assert_eq!(found.drives.len(), 1);
     assert!(
-        found.notes.iter().any(|note| note
-            .says
-            .in_library_words()
-            .starts_with("No drive acts on on_q2")),
+        found
+            .notes
+            .iter()
+            .any(|note| note.says.in_library_words().starts_with("No drive acts on on_q2")),
         "{:?}",
         found.notes
     );

@@ -51,11 +51,7 @@ pub(super) fn passive_effects(
             continue;
         }
         if !add_effect(mechanism, effect, format, &mut found) {
-            let places: Vec<String> = effect
-                .places
-                .iter()
-                .map(|p| place_text(mechanism, *p))
-                .collect();
+            let places: Vec<String> = effect.places.iter().map(|p| place_text(mechanism, *p)).collect();
             remarks.push(message!(
                 "`{}` at {} is left out: {} has no such effect",
                 effect.kind,
@@ -81,9 +77,7 @@ fn add_effect(
     };
     let constant = |symbol: &str| {
         let constant = effect.constants.iter().find(|(name, _)| name == symbol);
-        constant.map_or(0.0, |(_, value)| {
-            value.evaluate(&|s| mechanism.symbol_nominal(s))
-        })
+        constant.map_or(0.0, |(_, value)| value.evaluate(&|s| mechanism.symbol_nominal(s)))
     };
     // A spring and damper between two points.
     if effect.mechanics == Some(Mechanics::Strut) {
@@ -92,11 +86,7 @@ fn add_effect(
             return false;
         };
         // A pull of `F0 + k l` is a spring with the relaxed length `-F0/k`, which must be a valid length.
-        let rest = if constant == 0.0 {
-            0.0
-        } else {
-            -constant / stiffness
-        };
+        let rest = if constant == 0.0 { 0.0 } else { -constant / stiffness };
         if format != DescriptionFormat::Mjcf || !rest.is_finite() || rest < 0.0 {
             return false;
         }
@@ -110,10 +100,7 @@ fn add_effect(
         return true;
     }
     // Effects that are bodies are added to the links elsewhere, and a tilt of the base is in gravity already.
-    let is_body = effect
-        .places
-        .iter()
-        .all(|place| matches!(place, EffectPlace::Point(_)));
+    let is_body = effect.places.iter().all(|place| matches!(place, EffectPlace::Point(_)));
     if matches!(
         effect.mechanics,
         Some(Mechanics::Part | Mechanics::Placement | Mechanics::Tilt)
@@ -146,10 +133,7 @@ fn add_effect(
                 }
                 DriveKind::Linear { .. } => return false,
             },
-            EffectPlace::Point(_)
-            | EffectPlace::Part(_)
-            | EffectPlace::Base
-            | EffectPlace::Force => return false,
+            EffectPlace::Point(_) | EffectPlace::Part(_) | EffectPlace::Base | EffectPlace::Force => return false,
         }
     }
     true

@@ -3,9 +3,7 @@
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
-use modelmill_spec::{
-    EffectPlace, ExactExpression, FrameIdx, LumpedMass, Mechanism, ModelPart, PartInertia,
-};
+use modelmill_spec::{EffectPlace, ExactExpression, FrameIdx, LumpedMass, Mechanism, ModelPart, PartInertia};
 use nalgebra::{Matrix3, Vector3};
 
 use super::ExportError;
@@ -63,8 +61,7 @@ impl LinkInertia {
         let (r, t) = (placed.rotation, placed.origin);
         // Turn into the axes of the outer frame, then shift by the pose (Steiner).
         let turned = r * self.first;
-        let square =
-            |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b) * Matrix3::identity() - a * b.transpose();
+        let square = |a: &Vector3<f64>, b: &Vector3<f64>| a.dot(b) * Matrix3::identity() - a * b.transpose();
         Self {
             mass: self.mass,
             first: turned + self.mass * t,
@@ -86,21 +83,15 @@ impl LinkInertia {
 /// The inertia of each link, with the nominal values of the parameters.
 ///
 /// Fails if a lumped mass has different positions in the balances of forces and of moments.
-pub(super) fn bodies(
-    mechanism: &Mechanism,
-    tree: &LinkTree,
-) -> Result<Vec<LinkInertia>, ExportError> {
+pub(super) fn bodies(mechanism: &Mechanism, tree: &LinkTree) -> Result<Vec<LinkInertia>, ExportError> {
     // Values of exact expressions at the nominal values of all symbols.
-    let value =
-        |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let vector = |exact: &[ExactExpression; 3]| Vector3::from_fn(|k, _| value(&exact[k]));
     let mut bodies = vec![LinkInertia::NONE; tree.links.len()];
     // Add a body on a frame to the link that carries the frame.
     let mut add = |frame: FrameIdx, body: &LinkInertia| {
         let link = tree.link_of[frame.0];
-        let placed = tree.links[link]
-            .placed
-            .relative_placement(&tree.frames[frame.0]);
+        let placed = tree.links[link].placed.relative_placement(&tree.frames[frame.0]);
         bodies[link].add(&body.in_outer_frame(&placed));
     };
     // Some effects are bodies.
@@ -175,11 +166,7 @@ fn from_part(
             first: vector(first_moment),
             inertia: matrix(inertia),
         },
-        PartInertia::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
+        PartInertia::AboutCentre { mass, centre, inertia } => {
             // Steiner: the inertia of the mass at the centre, plus the inertia about the centre.
             let mut body = point_mass(value(mass), vector(centre));
             body.inertia += matrix(inertia);
@@ -190,11 +177,7 @@ fn from_part(
 
 /// Completes the inertia of links that only translate, or rotate about one direction only, so that it is physically
 /// possible. The moments that a model lacks have no effect on the motion of such links.
-pub(super) fn complete_inertias(
-    tree: &LinkTree,
-    bodies: &mut [LinkInertia],
-    remarks: &mut Vec<Message>,
-) {
+pub(super) fn complete_inertias(tree: &LinkTree, bodies: &mut [LinkInertia], remarks: &mut Vec<Message>) {
     let mut completed = Vec::new();
     for (l, link) in tree.links.iter().enumerate().skip(1) {
         let body = &mut bodies[l];
@@ -203,9 +186,7 @@ pub(super) fn complete_inertias(
             continue;
         }
         let central = match link_rotation(tree, l) {
-            LinkRotation::Never => {
-                body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity()
-            }
+            LinkRotation::Never => body.mass * DEFAULT_RADIUS_OF_GYRATION.powi(2) * Matrix3::identity(),
             LinkRotation::OneAxis(axis) => {
                 // The moment about the axis has an effect and is kept; the others get possible values.
                 let n = link.placed.rotation.transpose() * axis;
@@ -255,9 +236,7 @@ fn link_rotation(tree: &LinkTree, mut link: usize) -> LinkRotation {
             // Parallel axes are one direction.
             turns = match turns {
                 LinkRotation::Never => LinkRotation::OneAxis(joint.axis),
-                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => {
-                    LinkRotation::OneAxis(axis)
-                }
+                LinkRotation::OneAxis(axis) if axis.cross(&joint.axis).norm() < 1e-9 => LinkRotation::OneAxis(axis),
                 _ => return LinkRotation::AnyAxis,
             };
         }
@@ -284,11 +263,7 @@ fn inertia_fault(body: &LinkInertia) -> Option<&'static str> {
 }
 
 /// Adds a remark for each link with an impossible inertia; simulators refuse such links or become unstable.
-pub(super) fn report_impossible(
-    tree: &LinkTree,
-    bodies: &[LinkInertia],
-    remarks: &mut Vec<Message>,
-) {
+pub(super) fn report_impossible(tree: &LinkTree, bodies: &[LinkInertia], remarks: &mut Vec<Message>) {
     for (link, body) in tree.links.iter().zip(bodies).skip(1) {
         let Some(fault) = inertia_fault(body).filter(|_| !body.is_zero()) else {
             continue;

@@ -133,9 +133,7 @@ impl MjcfWriter<'_> {
     fn body(&mut self, at: usize) {
         let link = &self.tree.links[at];
         // Pose relative to the parent, as position and quaternion.
-        let placed = self.tree.links[link.parent]
-            .placed
-            .relative_placement(&link.placed);
+        let placed = self.tree.links[link.parent].placed.relative_placement(&link.placed);
         let turn = UnitQuaternion::from_rotation_matrix(&orthonormal(&placed.rotation));
         let head = format!(
             " name=\"{}\" pos=\"{}\" quat=\"{}\"",
@@ -181,12 +179,7 @@ impl MjcfWriter<'_> {
             let limits = self.mechanism.limits.coordinates.iter();
             let of = limits.clone().find(|(i, _)| i.0 == joint.coordinate);
             if let Some([low, high]) = of.and_then(|(_, one)| one.position) {
-                let _ = write!(
-                    text,
-                    " range=\"{} {}\"",
-                    number_text(low),
-                    number_text(high)
-                );
+                let _ = write!(text, " range=\"{} {}\"", number_text(low), number_text(high));
             }
             text += &passive_attributes(&self.friction.joints[joint.coordinate], "springref");
         }
@@ -208,14 +201,7 @@ impl MjcfWriter<'_> {
         }
         // MuJoCo's sequence of the six entries: the diagonal, then xy, xz, yz.
         let i = body.central_inertia();
-        let six = [
-            i[(0, 0)],
-            i[(1, 1)],
-            i[(2, 2)],
-            i[(0, 1)],
-            i[(0, 2)],
-            i[(1, 2)],
-        ];
+        let six = [i[(0, 0)], i[(1, 1)], i[(2, 2)], i[(0, 1)], i[(0, 2)], i[(1, 2)]];
         format!(
             "<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>",
             number_list(body.centre_of_mass().as_slice()),
@@ -233,9 +219,7 @@ impl MjcfWriter<'_> {
             let [a, b] = one.joins.map(|point| &m.points[point.0].name);
             // Names of loops may have other characters than letters and digits.
             let name = one.name.replace(|c: char| !c.is_alphanumeric(), "_");
-            lines.push(format!(
-                "<connect name=\"{name}\" site1=\"{a}\" site2=\"{b}\"/>"
-            ));
+            lines.push(format!("<connect name=\"{name}\" site1=\"{a}\" site2=\"{b}\"/>"));
         }
         // Joints of a coordinate that moves several joints follow the one with its name.
         for joint in self.tree.links.iter().flat_map(|link| &link.joints) {
@@ -329,11 +313,7 @@ impl MjcfWriter<'_> {
             let limits = m.limits.forces.iter();
             let range = limits.clone().find(|(i, _)| Some(i.0) == d);
             let range = range.map_or(String::new(), |(_, [low, high])| {
-                format!(
-                    " ctrlrange=\"{} {}\"",
-                    number_text(*low),
-                    number_text(*high)
-                )
+                format!(" ctrlrange=\"{} {}\"", number_text(*low), number_text(*high))
             });
             lines.push(format!("<motor name=\"{}\" {on}{range}/>", drive.name));
         }

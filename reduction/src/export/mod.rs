@@ -73,10 +73,7 @@ impl std::error::Error for ExportError {}
 ///
 /// Fails if a coordinate moves its joints only by ratios other than one, or a mass has different places in the balances
 /// of forces and of moments.
-pub fn export(
-    mechanism: &Mechanism,
-    format: DescriptionFormat,
-) -> Result<DescriptionExport, ExportError> {
+pub fn export(mechanism: &Mechanism, format: DescriptionFormat) -> Result<DescriptionExport, ExportError> {
     let mut remarks = Vec::new();
     // With loops, bodies are drawn at the nominal pose, where loops are closed; without loops at zero.
     let at: Vec<f64> = match format {
@@ -103,9 +100,7 @@ pub fn export(
     let friction = friction::passive_effects(mechanism, format, &mut remarks);
     let text = match format {
         DescriptionFormat::Urdf => urdf::write(mechanism, &tree, &bodies, &friction, &mut remarks),
-        DescriptionFormat::Mjcf => {
-            mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks)
-        }
+        DescriptionFormat::Mjcf => mjcf::write(mechanism, &tree, &bodies, &friction, &at, &mut remarks),
     };
     Ok(DescriptionExport { text, remarks })
 }
@@ -124,12 +119,8 @@ struct FollowedCoordinate {
 }
 
 /// Couplings to a single coordinate, with numeric values. Formats have no others, so a remark reports them.
-fn followed_coordinates(
-    mechanism: &Mechanism,
-    remarks: &mut Vec<Message>,
-) -> Vec<FollowedCoordinate> {
-    let value =
-        |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
+fn followed_coordinates(mechanism: &Mechanism, remarks: &mut Vec<Message>) -> Vec<FollowedCoordinate> {
+    let value = |exact: &ExactExpression| exact.evaluate(&|symbol| mechanism.symbol_nominal(symbol));
     let mut found = Vec::new();
     for coupling in &mechanism.couplings {
         // Both formats know couplings to one joint only.

@@ -121,10 +121,7 @@ pub(super) fn link_tree(mechanism: &Mechanism, at: &[f64]) -> Result<LinkTree, E
         let frame = &mechanism.frames[f];
         let parent = link_of[frame.parent.0];
         // A free body moves without joints.
-        let is_free = frame
-            .steps
-            .iter()
-            .any(|step| matches!(step, FrameStep::Free(_)));
+        let is_free = frame.steps.iter().any(|step| matches!(step, FrameStep::Free(_)));
         // A frame without motion belongs to the link of its parent.
         if pose.joint_axes.is_empty() && !is_free {
             link_of.push(parent);

@@ -26,10 +26,7 @@ pub(super) fn write(
 ) -> String {
     report_unsupported(mechanism, remarks);
     // The base link, then each link with the joints from its parent.
-    let mut text = format!(
-        "<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n",
-        mechanism.name
-    );
+    let mut text = format!("<?xml version=\"1.0\"?>\n<robot name=\"{}\">\n", mechanism.name);
     text += &link_element(&tree.links[0].name, None);
     for (one, body) in tree.links.iter().zip(bodies).skip(1) {
         text += &link_with_joints(mechanism, tree, one, body, friction);
@@ -42,11 +39,7 @@ pub(super) fn write(
 fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
     // Loops stay open.
     if !mechanism.loops.is_empty() {
-        let names: Vec<&str> = mechanism
-            .loops
-            .iter()
-            .map(|one| one.name.as_str())
-            .collect();
+        let names: Vec<&str> = mechanism.loops.iter().map(|one| one.name.as_str()).collect();
         remarks.push(message!(
             "URDF has no loops: {} left open, and passive joints are independent; use MJCF for loops",
             names.join(", ")
@@ -66,8 +59,7 @@ fn report_unsupported(mechanism: &Mechanism, remarks: &mut Vec<Message>) {
         ));
     }
     // Simulators have gravity in their own settings.
-    let gravity: [f64; 3] =
-        std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
+    let gravity: [f64; 3] = std::array::from_fn(|k| mechanism.gravity[k].evaluate(&|s| mechanism.symbol_nominal(s)));
     remarks.push(message!(
         "URDF does not specify gravity; set it in the simulator: {} m/s^2 along x, y and z of `{}`",
         number_list(&gravity),
@@ -85,10 +77,7 @@ fn link_with_joints(
 ) -> String {
     let mut text = String::new();
     // Name and pose of the link before the next joint.
-    let mut parent = (
-        tree.links[one.parent].name.clone(),
-        tree.links[one.parent].placed,
-    );
+    let mut parent = (tree.links[one.parent].name.clone(), tree.links[one.parent].placed);
     // Links without joints are free bodies.
     if one.joints.is_empty() {
         let origin = origin_element(&parent.1.relative_placement(&one.placed));
@@ -140,8 +129,7 @@ fn joint_element(
     let range = limits.and_then(|(_, one)| one.position);
     let rate = limits.and_then(|(_, one)| one.rate);
     let effort = mechanism.limits.forces.iter().find_map(|(d, range)| {
-        let drives_it =
-            matches!(mechanism.drives[d.0].kind, DriveKind::Joint(i) if i.0 == moving.coordinate);
+        let drives_it = matches!(mechanism.drives[d.0].kind, DriveKind::Joint(i) if i.0 == moving.coordinate);
         drives_it.then(|| range[0].abs().max(range[1].abs()))
     });
     // A rotation without a range has its own type.
@@ -170,14 +158,9 @@ fn joint_element(
         let bounds = if kind == "continuous" {
             String::new()
         } else {
-            format!(
-                "lower=\"{}\" upper=\"{}\" ",
-                number_text(low),
-                number_text(high)
-            )
+            format!("lower=\"{}\" upper=\"{}\" ", number_text(low), number_text(high))
         };
-        let most =
-            |range: Option<[f64; 2]>| range.map_or(UNLIMITED_RANGE, |r| r[0].abs().max(r[1].abs()));
+        let most = |range: Option<[f64; 2]>| range.map_or(UNLIMITED_RANGE, |r| r[0].abs().max(r[1].abs()));
         let _ = writeln!(
             text,
             "    <limit {bounds}effort=\"{}\" velocity=\"{}\"/>",
@@ -254,10 +237,5 @@ pub(super) fn clean(v: Vector3<f64>) -> Vector3<f64> {
 
 /// The nearest rotation to a rotation matrix with rounding errors.
 pub(super) fn orthonormal(rotation: &Matrix3<f64>) -> Rotation3<f64> {
-    Rotation3::from_matrix_eps(
-        rotation,
-        1e-15,
-        20,
-        Rotation3::from_matrix_unchecked(*rotation),
-    )
+    Rotation3::from_matrix_eps(rotation, 1e-15, 20, Rotation3::from_matrix_unchecked(*rotation))
 }

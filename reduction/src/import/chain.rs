@@ -67,8 +67,7 @@ impl FrameChain {
                 .compose(&node.at);
             let mut moves = Vec::new();
             for motion in &node.moves {
-                let value =
-                    motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
+                let value = motion.variable.map_or(0.0, |v| motion.ratio * values[v]) + motion.offset;
                 // The axis as the motions before have left it.
                 moves.push((at.r * motion.axis, at.p));
                 at = at.compose(&if motion.is_turn {
@@ -90,11 +89,7 @@ impl FrameChain {
 
     /// Gaps of all pairs (three rows each, m), their Jacobian with respect to the variables, and the size of the
     /// mechanism: the largest coordinate of a closure point, m.
-    pub(crate) fn gaps(
-        &self,
-        pairs: &[CoincidentPair],
-        values: &[f64],
-    ) -> (DVector<f64>, DMatrix<f64>, f64) {
+    pub(crate) fn gaps(&self, pairs: &[CoincidentPair], values: &[f64]) -> (DVector<f64>, DMatrix<f64>, f64) {
         let posed = self.pose(values);
         let mut gaps = DVector::zeros(3 * pairs.len());
         let mut rows = DMatrix::zeros(3 * pairs.len(), self.n_variables);
@@ -135,9 +130,9 @@ impl FrameChain {
     pub(crate) fn align_pairs(&self, pairs: &mut [CoincidentPair], values: &[f64]) {
         let posed = self.pose(values);
         for pair in pairs {
-            let [place, other] = pair.ends.map(|(frame, _)| {
-                frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at)
-            });
+            let [place, other] = pair
+                .ends
+                .map(|(frame, _)| frame.map_or(DescriptionPose::identity(), |frame| posed[frame].at));
             // The first point in the frame of the second one.
             let first = place.p + place.r * pair.ends[0].1;
             pair.ends[1].1 = other.r.transpose() * (first - other.p);

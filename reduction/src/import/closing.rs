@@ -70,9 +70,7 @@ pub(crate) fn close_loops(
                 // Poses near the start are moved into the ranges; later ones are anywhere within them.
                 let moved = x + spread * noise.next();
                 match range {
-                    Some([low, high]) if attempt > 40 => {
-                        low + (high - low) * (0.5 + 0.5 * noise.next())
-                    }
+                    Some([low, high]) if attempt > 40 => low + (high - low) * (0.5 + 0.5 * noise.next()),
                     Some([low, high]) if attempt > 0 => moved.clamp(*low, *high),
                     _ => moved,
                 }
@@ -83,9 +81,7 @@ pub(crate) fn close_loops(
         least = least.min(gap);
         if gap < NEARLY_CLOSED {
             let is_inside = values.iter().zip(ranges).all(|(x, range)| {
-                range.is_none_or(|[low, high]| {
-                    (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x)
-                })
+                range.is_none_or(|[low, high]| (low - RANGE_TOLERANCE..=high + RANGE_TOLERANCE).contains(x))
             });
             if is_inside {
                 poses.push(values);
@@ -160,22 +156,14 @@ pub(crate) fn close_loops(
 }
 
 /// Number of independent conditions of the pairs, and the smallest of their singular values relative to the largest.
-fn independent_conditions(
-    chain: &FrameChain,
-    pairs: &[CoincidentPair],
-    values: &[f64],
-) -> (usize, f64) {
+fn independent_conditions(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> (usize, f64) {
     // Where loops do not close exactly, redundant conditions have singular values of the size of the gap.
     let (gaps, rows, size) = chain.gaps(pairs, values);
     rank(&rows, ZERO_SHARE.max(GAP_FACTOR * gaps.amax() / size))
 }
 
 /// The pairs that add a condition to the pairs before them.
-fn independent_pairs(
-    chain: &FrameChain,
-    pairs: &[CoincidentPair],
-    values: &[f64],
-) -> Vec<CoincidentPair> {
+fn independent_pairs(chain: &FrameChain, pairs: &[CoincidentPair], values: &[f64]) -> Vec<CoincidentPair> {
     let mut kept: Vec<CoincidentPair> = Vec::new();
     let mut n = 0;
     for pair in pairs {
@@ -249,12 +237,7 @@ fn passive_conditioning(rows: &DMatrix<f64>, passive: &[bool]) -> f64 {
 
 /// Selects columns in the given order by Gram-Schmidt: a column is taken if the part orthogonal to those before is at
 /// least the share `least` of it. Returns the selection and its size.
-fn select_columns(
-    rows: &DMatrix<f64>,
-    order: &[usize],
-    wanted: usize,
-    least: f64,
-) -> (Vec<bool>, usize) {
+fn select_columns(rows: &DMatrix<f64>, order: &[usize], wanted: usize, least: f64) -> (Vec<bool>, usize) {
     let mut passive = vec![false; rows.ncols()];
     // Orthonormal directions of the columns chosen so far; two passes of Gram-Schmidt keep them orthogonal to rounding.
     let scale = rows.amax().max(f64::MIN_POSITIVE);

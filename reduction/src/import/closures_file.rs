@@ -40,13 +40,7 @@ pub(crate) struct CoincidentFrames {
 }
 
 /// Keys that are read; others are reported.
-const KNOWN_KEYS: [&str; 5] = [
-    "closed_loop",
-    "type",
-    "name_mot",
-    "joint_name",
-    "joint_type",
-];
+const KNOWN_KEYS: [&str; 5] = ["closed_loop", "type", "name_mot", "joint_name", "joint_type"];
 
 /// Reads the file; fails with the line and what was expected.
 pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
@@ -65,17 +59,15 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
             }
             continue;
         }
-        let (key, value) = text.split_once(':').ok_or_else(|| {
-            format!("line {line} of the file of closures: expected `key: value`, found `{text}`")
-        })?;
+        let (key, value) = text
+            .split_once(':')
+            .ok_or_else(|| format!("line {line} of the file of closures: expected `key: value`, found `{text}`"))?;
         entries.push((line, key.trim(), value.to_owned()));
     }
     // Line and words of a key; no words without the key.
     let list = |key: &str| -> (u32, Vec<String>) {
         let entry = entries.iter().find(|(_, name, _)| *name == key);
-        entry.map_or((0, Vec::new()), |(line, _, value)| {
-            (*line, list_words(value))
-        })
+        entry.map_or((0, Vec::new()), |(line, _, value)| (*line, list_words(value)))
     };
     let (line, ends) = list("closed_loop");
     let (_, kinds) = list("type");
@@ -117,9 +109,8 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
     // Other keys get a remark.
     for (line, key, _) in &entries {
         if !KNOWN_KEYS.contains(key) {
-            out.remarks.push(format!(
-                "line {line} of the file of closures: `{key}` is not read"
-            ));
+            out.remarks
+                .push(format!("line {line} of the file of closures: `{key}` is not read"));
         }
     }
     // Closures of three conditions (origins) or six (complete frames).
@@ -146,10 +137,7 @@ pub(crate) fn read(text: &str) -> Result<ClosureFile, String> {
 fn list_words(text: &str) -> Vec<String> {
     text.split([',', '[', ']', '\n'])
         .map(|word| {
-            let word = word
-                .trim()
-                .trim_start_matches("- ")
-                .trim_start_matches("- ");
+            let word = word.trim().trim_start_matches("- ").trim_start_matches("- ");
             word.trim().trim_matches(['\'', '"']).to_owned()
         })
         .filter(|word| !word.is_empty() && word != "-")

@@ -92,9 +92,8 @@ pub(crate) fn resolve(description: &mut RobotDescription) -> Result<ImportCoupli
         }
         let mut followers = joints.iter().zip(&rules);
         // A drive at a follower moves the variable too.
-        let leads_driven = followers.any(|(other, rule)| {
-            other.is_driven && rule.is_some_and(|rule| rule.leader == Some(leader))
-        });
+        let leads_driven =
+            followers.any(|(other, rule)| other.is_driven && rule.is_some_and(|rule| rule.leader == Some(leader)));
         variable_of[leader] = Some(variables.len());
         variables.push(JointVariable {
             joint: joint.name.clone(),
@@ -154,23 +153,16 @@ fn coupling_rules(
 ) -> Result<Vec<Option<CouplingRule>>, String> {
     // Index of a joint by its name.
     let index = |name: &str, line: u32| {
-        joints
-            .iter()
-            .position(|joint| joint.name == name)
-            .ok_or_else(|| {
-                format!("line {line}: the coupling names `{name}`, which is not a revolute or prismatic joint")
-            })
+        joints.iter().position(|joint| joint.name == name).ok_or_else(|| {
+            format!("line {line}: the coupling names `{name}`, which is not a revolute or prismatic joint")
+        })
     };
     let mut rules: Vec<Option<CouplingRule>> = vec![None; joints.len()];
     for coupling in &description.couplings {
         let line = coupling.line;
         // The joint and the one that it follows.
         let one = index(&coupling.joint, line)?;
-        let of = coupling
-            .leader
-            .as_deref()
-            .map(|of| index(of, line))
-            .transpose()?;
+        let of = coupling.leader.as_deref().map(|of| index(of, line)).transpose()?;
         if of == Some(one) {
             return Err(format!("line {line}: `{}` follows itself", coupling.joint));
         }
@@ -191,10 +183,7 @@ fn coupling_rules(
                 line,
             });
         } else {
-            return Err(format!(
-                "line {line}: `{}` follows two joints",
-                coupling.joint
-            ));
+            return Err(format!("line {line}: `{}` follows two joints", coupling.joint));
         }
     }
     // Replace leaders that are followers themselves, until the leader is independent.
@@ -238,10 +227,7 @@ fn prefer_driven_leaders(joints: &[DescriptionJoint], rules: &mut [Option<Coupli
         });
         let Some((new, lead)) = found else { continue };
         for (k, slot) in rules.iter_mut().enumerate() {
-            if let Some(rule) = slot
-                .as_mut()
-                .filter(|rule| rule.leader == Some(old) && k != new)
-            {
+            if let Some(rule) = slot.as_mut().filter(|rule| rule.leader == Some(old) && k != new) {
                 // The old leader as a function of the new one, inserted into the rule.
                 rule.ratio /= lead.ratio;
                 rule.offset -= rule.ratio * lead.offset;

@@ -89,12 +89,7 @@ impl GeomShape {
     }
 
     /// Mass and inertia of the shape at a pose, from a mass in kg or else from a density in kg/m^3.
-    pub(crate) fn inertial(
-        &self,
-        mass: Option<f64>,
-        density: f64,
-        at: DescriptionPose,
-    ) -> DescriptionInertia {
+    pub(crate) fn inertial(&self, mass: Option<f64>, density: f64, at: DescriptionPose) -> DescriptionInertia {
         let mass = mass.unwrap_or(density * self.volume);
         let moments = Vector3::from(self.moments) * mass;
         DescriptionInertia {

@@ -13,9 +13,7 @@ use super::description::{
 use super::geoms;
 use super::mjcf_defaults::MjcfDefaults;
 use super::placed::{DescriptionPose, rotation_about, rotation_from_quaternion};
-use super::xml::{
-    children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector,
-};
+use super::xml::{children, exact_numbers, line, located_message, numbers, required_attribute, symmetric, vector};
 
 /// Sections without effect on the dynamics, or read elsewhere; they are skipped without a remark.
 const NO_DYNAMICS: [&str; 12] = [
@@ -149,9 +147,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     // A remark for each section that is neither read nor known to have no effect.
     for node in root.children().filter(Node::is_element) {
         let tag = node.tag_name().name();
-        if !NO_DYNAMICS.contains(&tag)
-            && !["worldbody", "equality", "actuator", "tendon"].contains(&tag)
-        {
+        if !NO_DYNAMICS.contains(&tag) && !["worldbody", "equality", "actuator", "tendon"].contains(&tag) {
             reader
                 .out
                 .remarks
@@ -184,10 +180,7 @@ fn compiler(root: &Node) -> Result<MjcfCompiler, String> {
                 && sequence.chars().all(|c| "xyzXYZ".contains(c))
                 && (sequence == sequence.to_lowercase() || sequence == sequence.to_uppercase());
             if !is_fine {
-                return Err(located_message(
-                    &node,
-                    "expected three of x, y and z in `eulerseq`",
-                ));
+                return Err(located_message(&node, "expected three of x, y and z in `eulerseq`"));
             }
             sequence.clone_into(&mut out.euler);
         }
@@ -240,12 +233,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// An attribute of an element, its own or that of its default class.
-    pub(super) fn text(
-        &self,
-        node: &Node<'a, 'i>,
-        class: Option<&str>,
-        key: &str,
-    ) -> Result<Option<&'a str>, String> {
+    pub(super) fn text(&self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<Option<&'a str>, String> {
         self.defaults.attribute(node, class, key)
     }
 
@@ -261,12 +249,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The first number of an attribute, zero without it. Nonzero further ones are reported.
-    fn first(
-        &mut self,
-        node: &Node<'a, 'i>,
-        class: Option<&str>,
-        key: &str,
-    ) -> Result<f64, String> {
+    fn first(&mut self, node: &Node<'a, 'i>, class: Option<&str>, key: &str) -> Result<f64, String> {
         let Some(text) = self.text(node, class, key)? else {
             return Ok(0.0);
         };
@@ -281,11 +264,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Position and orientation of an element, from any of the ways in which MJCF specifies an orientation.
-    fn read_placement(
-        &self,
-        node: &Node<'a, 'i>,
-        class: Option<&str>,
-    ) -> Result<DescriptionPose, String> {
+    fn read_placement(&self, node: &Node<'a, 'i>, class: Option<&str>) -> Result<DescriptionPose, String> {
         // The position; then whichever orientation is given.
         let mut out = DescriptionPose::identity();
         if let Some(pos) = self.numbers(node, class, "pos")? {
@@ -315,9 +294,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         // The smallest rotation that turns the z axis into the given direction; half a turn about x for the opposite
         // one.
         if let Some(z) = self.numbers(node, class, "zaxis")? {
-            let z = vector(z)
-                .try_normalize(1e-12)
-                .ok_or_else(|| fault("zaxis"))?;
+            let z = vector(z).try_normalize(1e-12).ok_or_else(|| fault("zaxis"))?;
             let axis = Vector3::z().cross(&z);
             let angle = axis.norm().atan2(z.z);
             let axis = axis.try_normalize(1e-12).unwrap_or_else(Vector3::x);
@@ -398,9 +375,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 &format!("two bodies have the name `{name}`; rename one"),
             ));
         }
-        let parent = around
-            .link
-            .map_or(DescriptionPose::identity(), |link| self.world[link]);
+        let parent = around.link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         // Equalities between bodies need the poses in the world.
         self.world.push(parent.compose(&placed));
         let inertial = self.inertial(node, around.class)?;
@@ -411,10 +386,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 "this mocap body is moved from outside; it is fixed in the model",
             ));
         }
-        if node
-            .attribute("gravcomp")
-            .is_some_and(|text| text.trim() != "0")
-        {
+        if node.attribute("gravcomp").is_some_and(|text| text.trim() != "0") {
             self.out.remarks.push(located_message(
                 node,
                 "`gravcomp` is left out: it is a controller and not a property of the body, so the model has the full weight",
@@ -436,14 +408,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Mass and inertia of a body: its `<inertial>`, or its shapes, with the bounds of the file.
-    fn inertial(
-        &mut self,
-        node: &Node<'a, 'i>,
-        class: Option<&'a str>,
-    ) -> Result<DescriptionInertia, String> {
-        let given = node
-            .children()
-            .find(|child| child.tag_name().name() == "inertial");
+    fn inertial(&mut self, node: &Node<'a, 'i>, class: Option<&'a str>) -> Result<DescriptionInertia, String> {
+        let given = node.children().find(|child| child.tag_name().name() == "inertial");
         // The given inertia counts, unless the file demands that of the shapes.
         let mut found = match (given, self.compiler.from_geoms) {
             (Some(given), None | Some(false)) => {
@@ -462,10 +428,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 } else if let Some(text) = given.attribute("diaginertia") {
                     Matrix3::from_diagonal(&vector(exact_numbers(&given, "diaginertia", text)?))
                 } else {
-                    return Err(located_message(
-                        &given,
-                        "it needs `diaginertia` or `fullinertia`",
-                    ));
+                    return Err(located_message(&given, "it needs `diaginertia` or `fullinertia`"));
                 };
                 DescriptionInertia {
                     mass,
@@ -531,11 +494,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 let class = child.attribute("childclass").or(class);
                 match child.tag_name().name() {
                     "frame" => {
-                        waiting.push((
-                            child,
-                            class,
-                            place.compose(&self.read_placement(&child, class)?),
-                        ));
+                        waiting.push((child, class, place.compose(&self.read_placement(&child, class)?)));
                     }
                     "geom" => shapes.extend(self.geom_inertia(&child, class, place)?),
                     _ => {}
@@ -595,17 +554,12 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             let angle = axis.norm().atan2(z.z);
             placed.r = rotation_about(&axis.try_normalize(1e-12).unwrap_or_else(Vector3::x), angle);
         }
-        let shape = geoms::GeomShape::new(kind, &size, half)
-            .map_err(|fault| located_message(node, &fault))?;
+        let shape = geoms::GeomShape::new(kind, &size, half).map_err(|fault| located_message(node, &fault))?;
         Ok(shape.map(|shape| shape.inertial(mass, density, place.compose(&placed))))
     }
 
     /// Reads a free joint, which only a body of the world may have.
-    fn read_free_joint(
-        &mut self,
-        node: &Node<'a, 'i>,
-        inside: MjcfContext<'a>,
-    ) -> Result<(), String> {
+    fn read_free_joint(&mut self, node: &Node<'a, 'i>, inside: MjcfContext<'a>) -> Result<(), String> {
         let name = node.attribute("name").unwrap_or("root").to_owned();
         let Some(link) = inside.link else {
             return Ok(());
@@ -616,11 +570,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 "a free joint is possible for a child of the world only",
             ));
         }
-        self.out.links[link].joints.push(DescriptionJoint::new(
-            name,
-            DescriptionJointKind::Free,
-            line(node),
-        ));
+        self.out.links[link]
+            .joints
+            .push(DescriptionJoint::new(name, DescriptionJointKind::Free, line(node)));
         Ok(())
     }
 
@@ -642,9 +594,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             other => {
                 return Err(located_message(
                     node,
-                    &format!(
-                        "there is no joint type `{other}`; expected hinge, slide, ball or free"
-                    ),
+                    &format!("there is no joint type `{other}`; expected hinge, slide, ball or free"),
                 ));
             }
         };
@@ -652,11 +602,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         // Joints without a name are named after their body, with a number from the second on.
         let name = node.attribute("name").map_or_else(
             || {
-                let suffix = if n == 0 {
-                    String::new()
-                } else {
-                    format!("{}", n + 1)
-                };
+                let suffix = if n == 0 { String::new() } else { format!("{}", n + 1) };
                 format!("{}_joint{suffix}", self.out.links[link].name)
             },
             str::to_owned,
@@ -683,10 +629,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 reader.angle(value)
             }
         };
-        if matches!(
-            kind,
-            DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic
-        ) {
+        if matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic) {
             let zero = self.first(node, class, "ref")?;
             joint.zero = in_unit(self, zero);
         }

@@ -13,19 +13,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// out.
     pub(super) fn read_actuators(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
         let mut n = 0;
-        for node in children(root, "actuator").flat_map(|section| {
-            section
-                .children()
-                .filter(Node::is_element)
-                .collect::<Vec<_>>()
-        }) {
+        for node in children(root, "actuator")
+            .flat_map(|section| section.children().filter(Node::is_element).collect::<Vec<_>>())
+        {
             n += 1;
             // The first number of the gear is the ratio at a joint or tendon with one degree of freedom.
             let gear = match self.text(&node, None, "gear")? {
-                Some(text) => numbers(&node, "gear", text)?
-                    .first()
-                    .copied()
-                    .unwrap_or(1.0),
+                Some(text) => numbers(&node, "gear", text)?.first().copied().unwrap_or(1.0),
                 None => 1.0,
             };
             if let Some(name) = node.attribute("joint").or(node.attribute("jointinparent")) {
@@ -35,9 +29,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 let tendon = children(root, "tendon")
                     .flat_map(|section| section.children().collect::<Vec<_>>())
                     .find(|tendon| tendon.attribute("name") == Some(name))
-                    .ok_or_else(|| {
-                        located_message(&node, &format!("there is no tendon `{name}`"))
-                    })?;
+                    .ok_or_else(|| located_message(&node, &format!("there is no tendon `{name}`")))?;
                 if tendon.tag_name().name() != "fixed" {
                     self.add_tendon_drive(&node, &tendon, gear)?;
                     continue;
@@ -59,16 +51,13 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 ));
             }
         }
-        for tendon in children(root, "tendon").flat_map(|section| {
-            section
-                .children()
-                .filter(Node::is_element)
-                .collect::<Vec<_>>()
-        }) {
+        for tendon in
+            children(root, "tendon").flat_map(|section| section.children().filter(Node::is_element).collect::<Vec<_>>())
+        {
             // Springs and losses of tendons are not part of the model, except those of straight drives.
             let mut bends = Vec::new();
-            let is_drive = (self.out.straight_drives.iter())
-                .any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
+            let is_drive =
+                (self.out.straight_drives.iter()).any(|line| tendon.attribute("name") == Some(line.tendon.as_str()));
             // A straight drive has damping, friction and armature of its tendon, but not its spring.
             let kept = if is_drive { 1 } else { 4 };
             for key in ["stiffness", "damping", "frictionloss", "armature"]
@@ -76,10 +65,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 .take(kept)
             {
                 // One tendon is one drive, even if several actuators act on it.
-                if self
-                    .text(&tendon, None, key)?
-                    .is_some_and(|text| text.trim() != "0")
-                {
+                if self.text(&tendon, None, key)?.is_some_and(|text| text.trim() != "0") {
                     bends.push(key);
                 }
             }
@@ -90,10 +76,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 ));
             }
             if tendon.attribute("range").is_some() {
-                self.out.remarks.push(located_message(
-                    &tendon,
-                    "the range of this tendon is left out",
-                ));
+                self.out
+                    .remarks
+                    .push(located_message(&tendon, "the range of this tendon is left out"));
             }
         }
         // A file without actuators describes the mechanism only.
@@ -110,12 +95,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Adds a straight drive for an actuator on a spatial tendon, if the tendon is a straight line between two sites.
-    fn add_tendon_drive(
-        &mut self,
-        node: &Node<'a, 'i>,
-        tendon: &Node<'a, 'i>,
-        gear: f64,
-    ) -> Result<(), String> {
+    fn add_tendon_drive(&mut self, node: &Node<'a, 'i>, tendon: &Node<'a, 'i>, gear: f64) -> Result<(), String> {
         let parts: Vec<Node> = tendon.children().filter(Node::is_element).collect();
         // Pulleys and wrapped tendons have more elements, and their direction is not that of a line.
         let (&[one, other], true) = (
@@ -136,12 +116,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             *end = (link, place.p);
         }
         let line = tendon.attribute("name").unwrap_or_default().to_owned();
-        if self
-            .out
-            .straight_drives
-            .iter()
-            .any(|known| known.tendon == line)
-        {
+        if self.out.straight_drives.iter().any(|known| known.tendon == line) {
             self.out.remarks.push(located_message(
                 node,
                 &format!("another actuator also acts on the tendon `{line}`; both are one drive in the model"),
@@ -149,21 +124,15 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             return Ok(());
         }
         // Losses of the tendon, and the rotor inertia of the actuator by the square of its gear.
-        let own = |key: &str| {
-            Ok::<f64, String>(self.numbers::<1>(tendon, None, key)?.map_or(0.0, |[x]| x))
-        };
+        let own = |key: &str| Ok::<f64, String>(self.numbers::<1>(tendon, None, key)?.map_or(0.0, |[x]| x));
         let (damping, friction) = (own("damping")?, own("frictionloss")?);
         let on_tendon = own("armature")?;
-        let on_drive = self
-            .numbers::<1>(node, None, "armature")?
-            .map_or(0.0, |[x]| x);
+        let on_drive = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
         self.out.straight_drives.push(StraightDrive {
             name: node.attribute("name").unwrap_or(&line).to_owned(),
             line: super::xml::line(node),
             ends,
-            force: self
-                .force_range(node)?
-                .map(|range| scale_range(range, gear)),
+            force: self.force_range(node)?.map(|range| scale_range(range, gear)),
             damping,
             friction,
             armature: on_tendon + on_drive * gear * gear,
@@ -173,9 +142,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if (gear - 1.0).abs() > 0.0 {
             self.out.remarks.push(located_message(
                 node,
-                &format!(
-                    "its gear is {gear}; the force of the drive in the model is the force along the tendon"
-                ),
+                &format!("its gear is {gear}; the force of the drive in the model is the force along the tendon"),
             ));
         }
         Ok(())
@@ -200,16 +167,9 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Marks a joint as driven by an actuator `node`, with force limits and reflected rotor inertia.
-    fn add_joint_drive(
-        &mut self,
-        node: &Node<'a, 'i>,
-        name: &str,
-        gear: f64,
-    ) -> Result<(), String> {
+    fn add_joint_drive(&mut self, node: &Node<'a, 'i>, name: &str, gear: f64) -> Result<(), String> {
         let range = self.force_range(node)?;
-        let armature = self
-            .numbers::<1>(node, None, "armature")?
-            .map_or(0.0, |[x]| x);
+        let armature = self.numbers::<1>(node, None, "armature")?.map_or(0.0, |[x]| x);
         // The joint by its name.
         let joint = self
             .out
@@ -228,9 +188,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
         if (gear - 1.0).abs() > 0.0 && node.tag_name().name() != "joint" {
             self.out.remarks.push(located_message(
                 node,
-                &format!(
-                    "its gear is {gear}; the force of the drive in the model is the force at the joint `{name}`"
-                ),
+                &format!("its gear is {gear}; the force of the drive in the model is the force at the joint `{name}`"),
             ));
         }
         Ok(())
@@ -238,10 +196,8 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
 
     /// Reads the first keyframe with positions, as the pose from which loops are closed.
     pub(super) fn read_keyframe(&mut self, root: &Node<'a, 'i>) -> Result<(), String> {
-        let mut keys =
-            children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
-        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text)))
-        else {
+        let mut keys = children(root, "keyframe").flat_map(|section| section.children().collect::<Vec<_>>());
+        let Some((key, text)) = keys.find_map(|key| key.attribute("qpos").map(|text| (key, text))) else {
             return Ok(());
         };
         // Positions stand in the order of the joints; a ball joint has four, a free joint seven.

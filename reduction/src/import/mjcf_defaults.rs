@@ -39,10 +39,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
             (Some(name), _) => name,
             (None, None) => "main",
             (None, Some(_)) => {
-                return Err(located_message(
-                    &node,
-                    "a default class needs the attribute `class`",
-                ));
+                return Err(located_message(&node, "a default class needs the attribute `class`"));
             }
         };
         self.classes.push(MjcfDefaultClass {
@@ -77,9 +74,7 @@ impl<'a, 'i> MjcfDefaults<'a, 'i> {
                 self.classes
                     .iter()
                     .position(|class| class.name == name)
-                    .ok_or_else(|| {
-                        located_message(node, &format!("there is no default class `{name}`"))
-                    })?,
+                    .ok_or_else(|| located_message(node, &format!("there is no default class `{name}`")))?,
             ),
         };
         // From this class outwards, the first that has the attribute.

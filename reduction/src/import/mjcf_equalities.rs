@@ -8,8 +8,7 @@ use super::description::{ClosureConstraint, DescriptionClosure, DescriptionCoupl
 use super::mjcf::MjcfReader;
 use super::placed::{DescriptionPose, rotation_from_quaternion};
 use super::xml::{
-    children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute,
-    vector,
+    children, exact_numbers, line, located_message, number_attribute, numbers, required_attribute, vector,
 };
 
 impl<'a, 'i> MjcfReader<'a, 'i> {
@@ -25,11 +24,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// Link and pose of a site by name.
-    pub(super) fn site(
-        &self,
-        node: &Node,
-        name: &str,
-    ) -> Result<(Option<usize>, DescriptionPose), String> {
+    pub(super) fn site(&self, node: &Node, name: &str) -> Result<(Option<usize>, DescriptionPose), String> {
         let found = self.sites.iter().find(|(site, _, _)| site == name);
         found
             .map(|(_, link, placed)| (*link, *placed))
@@ -39,18 +34,16 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     /// Reads one equality; inactive ones are left out with a remark.
     pub(super) fn read_equality(&mut self, node: &Node<'a, 'i>) -> Result<(), String> {
         if self.text(node, None, "active")? == Some("false") {
-            self.out.remarks.push(located_message(
-                node,
-                "this equality is not active and is left out",
-            ));
+            self.out
+                .remarks
+                .push(located_message(node, "this equality is not active and is left out"));
             return Ok(());
         }
         let tag = node.tag_name().name();
         // Equalities without a name are numbered.
-        let name = node.attribute("name").map_or_else(
-            || format!("{tag}_{}", self.out.closures.len() + 1),
-            str::to_owned,
-        );
+        let name = node
+            .attribute("name")
+            .map_or_else(|| format!("{tag}_{}", self.out.closures.len() + 1), str::to_owned);
         match tag {
             "connect" | "weld" => {
                 let holds = if tag == "connect" {
@@ -60,10 +53,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
                 };
                 // The ends are given by two sites, or by two bodies with an anchor.
                 let ends = if node.attribute("site1").is_some() {
-                    let [one, other] = [
-                        required_attribute(node, "site1")?,
-                        required_attribute(node, "site2")?,
-                    ];
+                    let [one, other] = [required_attribute(node, "site1")?, required_attribute(node, "site2")?];
                     [self.site(node, &one)?, self.site(node, &other)?]
                 } else {
                     self.body_ends(node, tag)?
@@ -80,9 +70,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             other => {
                 return Err(located_message(
                     node,
-                    &format!(
-                        "the equality `{other}` is not supported; supported are connect, weld, joint and tendon"
-                    ),
+                    &format!("the equality `{other}` is not supported; supported are connect, weld, joint and tendon"),
                 ));
             }
         }
@@ -90,16 +78,11 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
     }
 
     /// The two ends of a closure between bodies; the second end is determined by the pose of the file.
-    fn body_ends(
-        &self,
-        node: &Node<'a, 'i>,
-        tag: &str,
-    ) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
+    fn body_ends(&self, node: &Node<'a, 'i>, tag: &str) -> Result<[(Option<usize>, DescriptionPose); 2], String> {
         let one = self.link(node, &required_attribute(node, "body1")?)?;
         let other = self.link(node, node.attribute("body2").unwrap_or("world"))?;
         // Poses of both bodies, as the file gives them, determine the second end.
-        let in_world =
-            |link: Option<usize>| link.map_or(DescriptionPose::identity(), |link| self.world[link]);
+        let in_world = |link: Option<usize>| link.map_or(DescriptionPose::identity(), |link| self.world[link]);
         let anchor = match node.attribute("anchor") {
             Some(text) => vector(exact_numbers(node, "anchor", text)?),
             None if tag == "weld" => Vector3::zeros(),
@@ -132,10 +115,7 @@ impl<'a, 'i> MjcfReader<'a, 'i> {
             p: anchor,
             r: Matrix3::identity(),
         };
-        let second = in_world(other)
-            .inverse()
-            .compose(&in_world(one))
-            .compose(&first);
+        let second = in_world(other).inverse().compose(&in_world(one)).compose(&first);
         Ok([(one, first), (other, second)])
     }
 
@@ -251,18 +231,11 @@ fn tendon_joints(node: &Node<'_, '_>, name: &str) -> Result<Vec<(String, f64)>, 
     if tendon.tag_name().name() != "fixed" {
         return Err(located_message(
             node,
-            &format!(
-                "`{name}` is a spatial tendon; a constant length is supported for fixed tendons only"
-            ),
+            &format!("`{name}` is a spatial tendon; a constant length is supported for fixed tendons only"),
         ));
     }
     let joints = children(&tendon, "joint");
     joints
-        .map(|joint| {
-            Ok((
-                required_attribute(&joint, "joint")?,
-                number_attribute(&joint, "coef")?,
-            ))
-        })
+        .map(|joint| Ok((required_attribute(&joint, "joint")?, number_attribute(&joint, "coef")?)))
         .collect()
 }

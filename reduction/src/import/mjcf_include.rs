@@ -15,10 +15,7 @@ const DEEPEST: usize = 20;
 /// file itself. `read` gives the text of a file by its name.
 ///
 /// Text that is not XML or not MJCF is returned unchanged; the import reports its fault.
-pub fn expand_includes(
-    text: &str,
-    read: &dyn Fn(&str) -> Result<String, String>,
-) -> Result<String, String> {
+pub fn expand_includes(text: &str, read: &dyn Fn(&str) -> Result<String, String>) -> Result<String, String> {
     expand_file(text, read, &mut Vec::new(), 0)
 }
 
@@ -56,9 +53,8 @@ fn expand_file(
         let other = read(&name).map_err(|fault| located_message(&node, &fault))?;
         let whole = expand_file(&other, read, seen, depth + 1)
             .map_err(|fault| located_message(&node, &format!("in `{name}`: {fault}")))?;
-        let inner = Document::parse(&whole).map_err(|fault| {
-            located_message(&node, &format!("`{name}` is not readable XML ({fault})"))
-        })?;
+        let inner = Document::parse(&whole)
+            .map_err(|fault| located_message(&node, &format!("`{name}` is not readable XML ({fault})")))?;
         let children = inner.root_element().children();
         let range = node.range();
         // The children of its root, without line breaks.

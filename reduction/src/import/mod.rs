@@ -93,9 +93,7 @@ pub const LARGEST_DESCRIPTION: usize = 16 << 20;
 /// element and line.
 pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, ImportError> {
     if text.len() > LARGEST_DESCRIPTION {
-        return Err(ImportError(
-            "this file is too large for a robot description".to_owned(),
-        ));
+        return Err(ImportError("this file is too large for a robot description".to_owned()));
     }
     // A frequent mistake is a file with macros or the YAML next to the description.
     let document = Document::parse(text).map_err(|error| {
@@ -140,11 +138,7 @@ pub fn import(text: &str, options: &Options) -> Result<DescriptionImport, Import
     }
     // The result is loaded like any model file, so that faults of the description appear here and not later.
     let imported = model_text::model_text(description, options).map_err(ImportError)?;
-    match modelmill_spec::load(
-        "the model made from it",
-        &imported.model,
-        &MemoryFiles::default(),
-    ) {
+    match modelmill_spec::load("the model made from it", &imported.model, &MemoryFiles::default()) {
         Ok(_) => Ok(imported),
         Err(failure) => Err(ImportError(format!(
             "the model file made from this description is not valid:\n{}",

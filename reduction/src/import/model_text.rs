@@ -15,8 +15,7 @@ use super::chain::{ChainFrame, ChainMotion, CoincidentPair, FrameChain};
 use super::closing::{self, LoopSolution, RANGE_TOLERANCE};
 use super::couplings::{self, ImportCouplings, JointFollower};
 use super::description::{
-    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink,
-    RobotDescription,
+    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::{DescriptionPose, named_axis, roll_pitch_yaw, twelfths_of_pi};
 use super::{DescriptionImport, ImportedJoint, Options};
@@ -126,10 +125,7 @@ struct ModelTextBuilder<'a> {
 /// Writes the model file of a description.
 ///
 /// Fails if nothing moves, a mass is negative, or the loops do not close.
-pub(crate) fn model_text(
-    mut description: RobotDescription,
-    options: &Options,
-) -> Result<DescriptionImport, String> {
+pub(crate) fn model_text(mut description: RobotDescription, options: &Options) -> Result<DescriptionImport, String> {
     // Joints first become variables, so that links can be written in one pass.
     let couplings = couplings::resolve(&mut description)?;
     let n = couplings.variables.len();
@@ -187,9 +183,7 @@ impl ModelTextBuilder<'_> {
         // The frame that carries the parent, and the pose of the parent in it.
         let (mut frame, carried) = link
             .parent
-            .map_or((None, DescriptionPose::identity()), |parent| {
-                self.links[parent]
-            });
+            .map_or((None, DescriptionPose::identity()), |parent| self.links[parent]);
         let mut here = carried.compose(&link.at);
         let n = link.joints.len();
         for (k, joint) in link.joints.iter().enumerate() {
@@ -225,12 +219,8 @@ impl ModelTextBuilder<'_> {
         name: &str,
     ) -> Result<(Option<usize>, DescriptionPose), String> {
         // Joints of a model move along a named axis, so the frame is turned for other directions.
-        let (axis, turned) = named_axis(&joint.axis).ok_or_else(|| {
-            format!(
-                "line {}: the axis of `{}` has no direction",
-                joint.line, joint.name
-            )
-        })?;
+        let (axis, turned) = named_axis(&joint.axis)
+            .ok_or_else(|| format!("line {}: the axis of `{}` has no direction", joint.line, joint.name))?;
         // Pose of the frame on its parent.
         let at = DescriptionPose {
             p: link.p + link.r * joint.anchor,
@@ -269,11 +259,7 @@ impl ModelTextBuilder<'_> {
             (None, Some((ratio, name))) => format!("{}*{name}", plain_number(*ratio)),
         };
         // A follower with its own coordinate has the offset in that coordinate.
-        let left = if follower.is_some() {
-            -joint.zero
-        } else {
-            constant
-        };
+        let left = if follower.is_some() { -joint.zero } else { constant };
         let offset = self.offset(&format!("{}_zero", joint.name), left, joint);
         let text = with_offset(text, &offset);
         let kind = if is_turn { "revolute" } else { "prismatic" };
@@ -358,12 +344,7 @@ impl ModelTextBuilder<'_> {
 
     /// Adds a coordinate that follows another one, and returns its name. If one is an angle and the other a length, the
     /// ratio is a constant with a unit.
-    fn follower(
-        &mut self,
-        joint: &DescriptionJoint,
-        leader: &str,
-        follows: &JointFollower,
-    ) -> String {
+    fn follower(&mut self, joint: &DescriptionJoint, leader: &str, follows: &JointFollower) -> String {
         let own = self.unique_name(&joint.name);
         let offset = self.offset(&format!("{}_offset", joint.name), follows.offset, joint);
         // A ratio between equal units is written as a number.
@@ -450,10 +431,7 @@ impl ModelTextBuilder<'_> {
             acts.force = joint.force.map(|force| force.map(|force| force * ratio));
         }
         // Loops are closed from the pose of the description, or from the zero of the joint.
-        let given = description
-            .pose
-            .iter()
-            .find(|(name, _)| name == &joint.name);
+        let given = description.pose.iter().find(|(name, _)| name == &joint.name);
         match given {
             Some((_, value)) if is_leader => self.start[variable] = (value - offset) / ratio,
             None if is_leader => self.start[variable] = (joint.zero - offset) / ratio,
@@ -517,14 +495,11 @@ impl ModelTextBuilder<'_> {
             joint.line, joint.name
         ));
         // Effects at the angles would be different from effects at the joint.
-        if joint.damping != 0.0
-            || joint.friction != 0.0
-            || joint.stiffness != 0.0
-            || joint.armature != 0.0
-        {
+        if joint.damping != 0.0 || joint.friction != 0.0 || joint.stiffness != 0.0 || joint.armature != 0.0 {
             self.remarks.push(message!(
                 "line {}: damping, friction, spring and armature of the ball joint `{}` are left out",
-                joint.line, joint.name
+                joint.line,
+                joint.name
             ));
         }
         self.joints.push(ImportedJoint {
@@ -579,10 +554,7 @@ impl ModelTextBuilder<'_> {
             axes: "wxyz".to_owned(),
         });
         let list: Vec<String> = names.iter().map(|name| format!("\"{name}\"")).collect();
-        let text = format!(
-            "free = [{}], quaternion = \"wxyz\", twist = \"mixed\"",
-            list.join(", ")
-        );
+        let text = format!("free = [{}], quaternion = \"wxyz\", twist = \"mixed\"", list.join(", "));
         // A free body has no joint at which these could act.
         if joint.damping != 0.0 || joint.armature != 0.0 || joint.friction != 0.0 {
             self.remarks.push(message!(
@@ -629,10 +601,7 @@ impl ModelTextBuilder<'_> {
     ) -> usize {
         // The table of the model file.
         let parent = on.map_or("base", |on| self.frame_names[on].as_str());
-        let _ = write!(
-            self.frames,
-            "\n[[frame]]\nname = \"{name}\"\non = \"{parent}\"\n"
-        );
+        let _ = write!(self.frames, "\n[[frame]]\nname = \"{name}\"\non = \"{parent}\"\n");
         if !place.is_empty() || joint.is_empty() {
             let _ = writeln!(self.frames, "transform = {{ {place} }}");
         }
@@ -665,9 +634,7 @@ impl ModelTextBuilder<'_> {
         }
         // Principal moments of a body are positive and satisfy the triangle inequality.
         let moments = matrix.symmetric_eigenvalues();
-        if moments.min() < -1e-15 * moments.amax()
-            || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6)
-        {
+        if moments.min() < -1e-15 * moments.amax() || 2.0 * moments.amax() > moments.sum() * (1.0 + 1e-6) {
             self.remarks.push(message!(
                 "the inertia of `{name}` is impossible for a body: its principal moments are {}, {} and {} kg m^2",
                 significant_digits(moments[0], 4),
@@ -712,9 +679,7 @@ impl ModelTextBuilder<'_> {
             };
             // Without loops the nominal value is zero, or the middle of the range if zero is outside.
             coordinate.nominal = match self.acts[variable].range {
-                Some([low, high]) if low < high && !(low..=high).contains(&0.0) => {
-                    0.5 * (low + high)
-                }
+                Some([low, high]) if low < high && !(low..=high).contains(&0.0) => 0.5 * (low + high),
                 _ => 0.0,
             };
         }
@@ -724,11 +689,7 @@ impl ModelTextBuilder<'_> {
             let offsets: &[[f64; 3]] = match closure.constraint {
                 ClosureConstraint::Origins => &[[0.0; 3]],
                 ClosureConstraint::Axes => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0]],
-                ClosureConstraint::Frames => &[
-                    [0.0; 3],
-                    [ORIENTATION_ARM, 0.0, 0.0],
-                    [0.0, ORIENTATION_ARM, 0.0],
-                ],
+                ClosureConstraint::Frames => &[[0.0; 3], [ORIENTATION_ARM, 0.0, 0.0], [0.0, ORIENTATION_ARM, 0.0]],
             };
             for offset in offsets {
                 // The point in the frames that carry both links.
@@ -755,8 +716,7 @@ impl ModelTextBuilder<'_> {
             .iter()
             .map(|acts| acts.range.filter(|[low, high]| low < high))
             .collect();
-        let closed =
-            closing::close_loops(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
+        let closed = closing::close_loops(&self.chain, &pairs, &self.start, &ranges, &self.reluctance)?;
         for coordinate in &mut self.coordinates {
             let Some(variable) = coordinate.variable else {
                 continue;
@@ -802,11 +762,7 @@ impl ModelTextBuilder<'_> {
     }
 
     /// Fails if a closure connects a free body to the world or to another body.
-    fn check_free_ends(
-        &self,
-        closure: &DescriptionClosure,
-        ends: [Option<usize>; 2],
-    ) -> Result<(), String> {
+    fn check_free_ends(&self, closure: &DescriptionClosure, ends: [Option<usize>; 2]) -> Result<(), String> {
         // The frame at the root of each end, if it is that of a free body.
         let roots = ends.map(|mut frame| {
             let mut root = None;
@@ -816,9 +772,9 @@ impl ModelTextBuilder<'_> {
             }
             root.filter(|root| {
                 let name = &self.frame_names[*root];
-                self.frames.split("\n[[frame]]\n").any(|text| {
-                    text.starts_with(&format!("name = \"{name}\"\n")) && text.contains("{ free = ")
-                })
+                self.frames
+                    .split("\n[[frame]]\n")
+                    .any(|text| text.starts_with(&format!("name = \"{name}\"\n")) && text.contains("{ free = "))
             })
         });
         if roots[0] == roots[1] {
@@ -897,11 +853,7 @@ impl ModelTextBuilder<'_> {
         }
         if deviation < same && n.abs() <= 48.0 {
             let text = twelfths_of_pi(n);
-            return if text == "0" {
-                text
-            } else {
-                format!("\"{text}\"")
-            };
+            return if text == "0" { text } else { format!("\"{text}\"") };
         }
         // An angle that differs from a known one by a multiple of pi/12, as in fingers that face each other, is written
         // as this sum.
@@ -1009,20 +961,12 @@ impl ModelTextBuilder<'_> {
     }
 
     /// Writes the points and loops of the independent closures.
-    fn loops(
-        &mut self,
-        description: &RobotDescription,
-        closed: Option<&LoopSolution>,
-        text: &mut String,
-    ) {
+    fn loops(&mut self, description: &RobotDescription, closed: Option<&LoopSolution>, text: &mut String) {
         let Some(closed) = closed else { return };
         let mut loops = String::new();
         // Each pair is a loop between two points.
         for pair in &closed.pairs {
-            let name = self.unique_name(&format!(
-                "{}_closed",
-                description.closures[pair.closure].name
-            ));
+            let name = self.unique_name(&format!("{}_closed", description.closures[pair.closure].name));
             let mut points = Vec::new();
             for ((frame, at), letter) in pair.ends.iter().zip(["a", "b"]) {
                 let point = self.unique_name(&format!("{name}_{letter}"));
@@ -1147,11 +1091,7 @@ impl ModelTextBuilder<'_> {
                 );
                 // The relaxed position of several springs is the mean, weighted with their stiffnesses.
                 if kind == "spring" {
-                    let _ = writeln!(
-                        effects,
-                        "constants = {{ rest = {} }}",
-                        toml_float(acts.pull / value)
-                    );
+                    let _ = writeln!(effects, "constants = {{ rest = {} }}", toml_float(acts.pull / value));
                 }
             }
             // Limits of the coordinate; the rate of a passive one follows from the others.

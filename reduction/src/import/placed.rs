@@ -39,10 +39,7 @@ impl DescriptionPose {
     /// The pose of the frame in this pose.
     pub(crate) fn inverse(&self) -> Self {
         let r = self.r.transpose();
-        Self {
-            p: -(r * self.p),
-            r,
-        }
+        Self { p: -(r * self.p), r }
     }
 }
 
@@ -53,9 +50,7 @@ pub(crate) fn rotation_about(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
 
 /// The rotation matrix `Rz(yaw) Ry(pitch) Rx(roll)`, angles in rad.
 pub(crate) fn rotation([roll, pitch, yaw]: [f64; 3]) -> Matrix3<f64> {
-    rotation_about(&Vector3::z(), yaw)
-        * rotation_about(&Vector3::y(), pitch)
-        * rotation_about(&Vector3::x(), roll)
+    rotation_about(&Vector3::z(), yaw) * rotation_about(&Vector3::y(), pitch) * rotation_about(&Vector3::x(), roll)
 }
 
 /// The rotation matrix of a quaternion w, x, y, z of any length; none if it is zero.
@@ -90,10 +85,7 @@ pub(crate) fn twelfths_of_pi(n: f64) -> String {
     #[allow(clippy::cast_possible_truncation, reason = "at most 48")]
     let n = n as i64;
     // The greatest common divisor with 12.
-    let common = (1..=12)
-        .rev()
-        .find(|d| n % d == 0 && 12 % d == 0)
-        .unwrap_or(1);
+    let common = (1..=12).rev().find(|d| n % d == 0 && 12 % d == 0).unwrap_or(1);
     match (n / common, 12 / common) {
         (0, _) => "0".to_owned(),
         (1, 1) => "pi".to_owned(),
@@ -113,10 +105,7 @@ pub(crate) fn named_axis(direction: &Vector3<f64>) -> Option<(&'static str, Matr
     }
     // A coordinate axis in either direction needs no rotation.
     let unit = direction / length;
-    for (k, names) in [["x", "-x"], ["y", "-y"], ["z", "-z"]]
-        .into_iter()
-        .enumerate()
-    {
+    for (k, names) in [["x", "-x"], ["y", "-y"], ["z", "-z"]].into_iter().enumerate() {
         let others = unit[(k + 1) % 3].hypot(unit[(k + 2) % 3]);
         if others < 1e-13 {
             return Some((names[usize::from(unit[k] < 0.0)], Matrix3::identity()));

@@ -6,13 +6,12 @@ use nalgebra::{Matrix3, Vector3};
 use roxmltree::{Document, Node};
 
 use super::description::{
-    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia,
-    DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
+    DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::{DescriptionPose, rotation, rotation_from_quaternion};
 use super::xml::{
-    child, children, exact_numbers, line, located_message, required_attribute, required_child,
-    symmetric, vector,
+    child, children, exact_numbers, line, located_message, required_attribute, required_child, symmetric, vector,
 };
 
 /// Values beyond this mean "no limit".
@@ -58,8 +57,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         .unwrap_or(1.7);
     // The model is in the file directly, or in a world.
     let world = child(&root, "world");
-    let mut models =
-        children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
+    let mut models = children(&root, "model").chain(world.iter().flat_map(|world| children(world, "model")));
     let model = models
         .next()
         .ok_or_else(|| located_message(&root, "it needs a <model>"))?;
@@ -76,11 +74,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     };
     // Only a world specifies gravity.
     if let Some(node) = world.and_then(|world| child(&world, "gravity")) {
-        out.gravity = Some(vector(exact_numbers(
-            &node,
-            "gravity",
-            node.text().unwrap_or(""),
-        )?));
+        out.gravity = Some(vector(exact_numbers(&node, "gravity", node.text().unwrap_or(""))?));
     }
     // Models inside a model would need names with their scope.
     if let Some(inner) = model
@@ -93,22 +87,14 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
         ));
     }
     if text_of(&model, "static").is_some_and(|text| ["true", "1"].contains(&text)) {
-        return Err(located_message(
-            &model,
-            "the model is static, so nothing moves",
-        ));
+        return Err(located_message(&model, "the model is static, so nothing moves"));
     }
     // Poses of all links in the model, through the frames to which they refer.
     let frames = model_frames(&model)?;
     let links: Vec<Node> = children(&model, "link").collect();
     let mut places = Vec::new();
     for node in &links {
-        places.push(pose_in_model(
-            &frames,
-            &required_attribute(node, "name")?,
-            node,
-            0,
-        )?);
+        places.push(pose_in_model(&frames, &required_attribute(node, "name")?, node, 0)?);
     }
     let mut joints = Vec::new();
     for node in children(&model, "joint") {
@@ -122,11 +108,7 @@ pub(crate) fn read(document: &Document) -> Result<RobotDescription, String> {
     // The canonical link, by default the first one.
     let base = model
         .attribute("canonical_link")
-        .and_then(|name| {
-            links
-                .iter()
-                .position(|node| node.attribute("name") == Some(name))
-        })
+        .and_then(|name| links.iter().position(|node| node.attribute("name") == Some(name)))
         .unwrap_or(0);
     tree(&mut out, &links, &places, &joints, &own, base)?;
     Ok(out)
@@ -153,10 +135,7 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
         let usually = match node.tag_name().name() {
             "link" => "__model__".to_owned(),
             "joint" => text_of(&node, "child").unwrap_or("__model__").to_owned(),
-            "frame" => node
-                .attribute("attached_to")
-                .unwrap_or("__model__")
-                .to_owned(),
+            "frame" => node.attribute("attached_to").unwrap_or("__model__").to_owned(),
             _ => continue,
         };
         let name = required_attribute(&node, "name")?;
@@ -167,22 +146,13 @@ fn model_frames<'a, 'i>(model: &Node<'a, 'i>) -> Result<Vec<SdfFrame<'a, 'i>>, S
         {
             return Err(located_message(&node, "this name occurs twice; rename one"));
         }
-        out.push(SdfFrame {
-            name,
-            node,
-            usually,
-        });
+        out.push(SdfFrame { name, node, usually });
     }
     Ok(out)
 }
 
 /// The pose of a frame in the model, through all frames to which it is relative. `from` is the element for messages.
-fn pose_in_model(
-    frames: &[SdfFrame],
-    name: &str,
-    from: &Node,
-    depth: usize,
-) -> Result<DescriptionPose, String> {
+fn pose_in_model(frames: &[SdfFrame], name: &str, from: &Node, depth: usize) -> Result<DescriptionPose, String> {
     // The recursion ends at the frame of the model.
     if name == "__model__" || name.is_empty() || name == "world" {
         return Ok(DescriptionPose::identity());
@@ -217,8 +187,7 @@ fn pose_of(node: &Node) -> Result<DescriptionPose, String> {
         let [px, py, pz, x, y, z, w] = exact_numbers(node, "pose", text)?;
         return Ok(DescriptionPose {
             p: Vector3::new(px, py, pz),
-            r: rotation_from_quaternion([w, x, y, z])
-                .ok_or_else(|| located_message(node, "the quaternion is zero"))?,
+            r: rotation_from_quaternion([w, x, y, z]).ok_or_else(|| located_message(node, "the quaternion is zero"))?,
         });
     }
     // Otherwise roll, pitch and yaw, in rad unless stated.
@@ -252,10 +221,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     // Missing entries keep the defaults of the format.
     out.mass = number_of(&given, "mass")?.unwrap_or(1.0);
     if let Some(pose) = child(&given, "pose") {
-        if pose
-            .attribute("relative_to")
-            .is_some_and(|name| !name.is_empty())
-        {
+        if pose.attribute("relative_to").is_some_and(|name| !name.is_empty()) {
             return Err(located_message(
                 &pose,
                 "the pose of an <inertial> is always relative to its link; delete `relative_to`",
@@ -265,10 +231,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     }
     if let Some(inertia) = child(&given, "inertia") {
         let mut entries = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0];
-        for (entry, key) in entries
-            .iter_mut()
-            .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
-        {
+        for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
             *entry = number_of(&inertia, key)?.unwrap_or(*entry);
         }
         out.inertia = symmetric(entries);
@@ -294,10 +257,7 @@ fn joint(
             if name == "world" {
                 return Ok(None);
             }
-            if let Some(k) = links
-                .iter()
-                .position(|link| link.attribute("name") == Some(&name))
-            {
+            if let Some(k) = links.iter().position(|link| link.attribute("name") == Some(&name)) {
                 return Ok(Some(k));
             }
             let frame = frames
@@ -362,8 +322,7 @@ fn joint(
     }
     // Sensors and settings of the solver have no effect on the model.
     if let Some(physics) = child(node, "sensor").or(child(node, "physics")) {
-        out.remarks
-            .push(located_message(&physics, "this element is not read"));
+        out.remarks.push(located_message(&physics, "this element is not read"));
     }
     Ok(SdfJoint {
         parent,
@@ -389,11 +348,7 @@ fn screw_coupling(
         )
     })?;
     // The translation keeps only axis and anchor; limits and losses are not counted twice.
-    let mut bare = DescriptionJoint::new(
-        slide.name.clone(),
-        DescriptionJointKind::Prismatic,
-        slide.line,
-    );
+    let mut bare = DescriptionJoint::new(slide.name.clone(), DescriptionJointKind::Prismatic, slide.line);
     (bare.axis, bare.anchor) = (slide.axis, slide.anchor);
     bare.is_driven = false;
     *slide = bare;
@@ -429,17 +384,12 @@ fn read_axis(
     let (xyz, turned) = match child(node, "xyz") {
         Some(xyz) => {
             // The axis is given in the axes of the joint, or of a named frame.
-            let given = xyz
-                .attribute("expressed_in")
-                .filter(|name| !name.is_empty());
+            let given = xyz.attribute("expressed_in").filter(|name| !name.is_empty());
             let turned = match given {
                 Some(name) => pose_in_model(frames, name, node, 0)?.r,
                 None => place.r,
             };
-            (
-                vector(exact_numbers(&xyz, "xyz", xyz.text().unwrap_or(""))?),
-                turned,
-            )
+            (vector(exact_numbers(&xyz, "xyz", xyz.text().unwrap_or(""))?), turned)
         }
         None => (Vector3::z(), place.r),
     };
@@ -565,11 +515,7 @@ fn tree(
             for (between, _) in joints.iter().zip(&in_tree).filter(|(_, is)| **is) {
                 // The tree can pass a joint in either direction.
                 let is_forward = between.parent == here;
-                let there = if is_forward {
-                    between.child
-                } else {
-                    between.parent
-                };
+                let there = if is_forward { between.child } else { between.parent };
                 if !(is_forward || between.child == here) {
                     continue;
                 }
@@ -589,10 +535,7 @@ fn tree(
                     }
                 }
                 if !is_forward {
-                    if moving
-                        .iter()
-                        .any(|joint| joint.kind == DescriptionJointKind::Ball)
-                    {
+                    if moving.iter().any(|joint| joint.kind == DescriptionJointKind::Ball) {
                         out.remarks.push(format!(
                             "line {}: the tree passes the ball joint `{}` from child to parent; its angles are those of the parent relative to \
                              the child",
@@ -614,12 +557,7 @@ fn tree(
         }
     }
     // Joints outside of the tree close loops.
-    for between in joints
-        .iter()
-        .zip(&in_tree)
-        .filter(|(_, is)| !**is)
-        .map(|(b, _)| b)
-    {
+    for between in joints.iter().zip(&in_tree).filter(|(_, is)| !**is).map(|(b, _)| b) {
         // The conditions of the closure.
         let holds = match between.kind.as_str() {
             "ball" => ClosureConstraint::Origins,

@@ -7,13 +7,13 @@ use roxmltree::{Document, Node};
 
 use super::closures_file::{self, ClosureFile, JointReplacement};
 use super::description::{
-    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia,
-    DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
+    ClosureConstraint, DescriptionClosure, DescriptionCoupling, DescriptionInertia, DescriptionJoint,
+    DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::DescriptionPose;
 use super::xml::{
-    child, children, line, located_message, number_attribute, required_attribute, required_child,
-    symmetric, three_numbers, vector,
+    child, children, line, located_message, number_attribute, required_attribute, required_child, symmetric,
+    three_numbers, vector,
 };
 
 /// A joint between two links, as the file describes it.
@@ -35,11 +35,7 @@ struct UrdfJoint {
 /// Reads a description; fails with one line that states the fault and its place. `closures` is the text of a
 /// `robot.yaml`.
 #[allow(clippy::too_many_lines, reason = "elements in their order")]
-pub(crate) fn read(
-    document: &Document,
-    closures: Option<&str>,
-    is_floating: bool,
-) -> Result<RobotDescription, String> {
+pub(crate) fn read(document: &Document, closures: Option<&str>, is_floating: bool) -> Result<RobotDescription, String> {
     let robot = document.root_element();
     let mut out = RobotDescription {
         name: robot.attribute("name").unwrap_or("robot").to_owned(),
@@ -63,9 +59,7 @@ pub(crate) fn read(
     for node in children(&robot, "transmission") {
         for reduction in node.descendants().filter(|node| {
             node.tag_name().name() == "mechanicalReduction"
-                && node
-                    .text()
-                    .is_some_and(|text| text.trim().parse() != Ok(1.0))
+                && node.text().is_some_and(|text| text.trim().parse() != Ok(1.0))
         }) {
             out.remarks.push(format!(
                 "line {}: the reduction {} of the transmission `{}` is ignored; forces of the model are those at the joints",
@@ -75,10 +69,7 @@ pub(crate) fn read(
             ));
         }
     }
-    if let Some(node) = robot
-        .children()
-        .find(|node| node.tag_name().name() == "loop_joint")
-    {
+    if let Some(node) = robot.children().find(|node| node.tag_name().name() == "loop_joint") {
         return Err(located_message(
             &node,
             "<loop_joint> is not part of the URDF standard; write the closure into a robot.yaml next to the file",
@@ -106,10 +97,7 @@ pub(crate) fn read(
             link.parent = out.links.iter().position(|link| link.name == joint.parent);
             link.at = joint.origin;
             link.joints.clone_from(&joint.joints);
-            if joint
-                .joints
-                .iter()
-                .any(|j| j.kind == DescriptionJointKind::Free)
+            if joint.joints.iter().any(|j| j.kind == DescriptionJointKind::Free)
                 && joint.parent != required_attribute(&root, "name")?
             {
                 return Err(format!(
@@ -167,10 +155,7 @@ pub(crate) fn read(
 }
 
 /// Replaces joints by the kinds that the file of closures gives for them. Damping and friction of the URDF stay.
-fn replace_joints(
-    joints: &mut [UrdfJoint],
-    by: &[(String, JointReplacement)],
-) -> Result<(), String> {
+fn replace_joints(joints: &mut [UrdfJoint], by: &[(String, JointReplacement)]) -> Result<(), String> {
     for (name, becomes) in by {
         let found = joints.iter_mut().find(|joint| &joint.name == name);
         let Some(UrdfJoint { joints, line, .. }) = found else {
@@ -182,9 +167,7 @@ fn replace_joints(
         let old = std::mem::take(joints);
         let new = |name: String, kind: DescriptionJointKind| {
             let mut joint = DescriptionJoint::new(name, kind, *line);
-            (joint.damping, joint.friction) = old
-                .first()
-                .map_or((0.0, 0.0), |old| (old.damping, old.friction));
+            (joint.damping, joint.friction) = old.first().map_or((0.0, 0.0), |old| (old.damping, old.friction));
             joint
         };
         match becomes {
@@ -254,10 +237,7 @@ fn check_names(links: &[Node], joints: &[UrdfJoint]) -> Result<(), String> {
             ));
         }
         for end in [&joint.parent, &joint.child] {
-            if links
-                .iter()
-                .all(|node| node.attribute("name") != Some(end.as_str()))
-            {
+            if links.iter().all(|node| node.attribute("name") != Some(end.as_str())) {
                 return Err(format!(
                     "line {}: the joint `{}` names the link `{end}`, which does not exist",
                     joint.line, joint.name
@@ -300,10 +280,7 @@ fn inertial(node: &Node) -> Result<DescriptionInertia, String> {
     let inertia = required_child(&inertial, "inertia")?;
     // The six independent entries of the symmetric matrix.
     let mut entries = [0.0; 6];
-    for (entry, key) in entries
-        .iter_mut()
-        .zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"])
-    {
+    for (entry, key) in entries.iter_mut().zip(["ixx", "iyy", "izz", "ixy", "ixz", "iyz"]) {
         *entry = number_attribute(&inertia, key)?;
     }
     Ok(DescriptionInertia {
@@ -346,17 +323,12 @@ fn joint(node: &Node, out: &mut RobotDescription) -> Result<UrdfJoint, String> {
             Some(axis) => vector(three_numbers(&axis, "xyz")?),
             None => vector([1.0, 0.0, 0.0]),
         };
-        if joint.axis.norm() == 0.0
-            && matches!(
-                kind,
-                DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic
-            )
+        if joint.axis.norm() == 0.0 && matches!(kind, DescriptionJointKind::Revolute | DescriptionJointKind::Prismatic)
         {
             return Err(located_message(node, "the axis has no direction"));
         }
         let (lower, upper) = (given(limit, "lower")?, given(limit, "upper")?);
-        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some())
-        {
+        if required_attribute(node, "type")? != "continuous" && (lower.is_some() || upper.is_some()) {
             // The format defines zero as the default of each bound.
             let range = [lower.unwrap_or(0.0), upper.unwrap_or(0.0)];
             joint.range = (range[0] < range[1]).then_some(range);
@@ -403,26 +375,19 @@ fn origin(of: &Node) -> Result<DescriptionPose, String> {
             Ok([0.0; 3])
         }
     };
-    Ok(DescriptionPose::from_xyz_rpy(
-        or_zeros("xyz")?,
-        or_zeros("rpy")?,
-    ))
+    Ok(DescriptionPose::from_xyz_rpy(or_zeros("xyz")?, or_zeros("rpy")?))
 }
 
 /// Adds the contents of a file of closures: frames that coincide and joints that are driven.
-fn add_closures(
-    out: &mut RobotDescription,
-    joints: &[UrdfJoint],
-    file: ClosureFile,
-) -> Result<(), String> {
+fn add_closures(out: &mut RobotDescription, joints: &[UrdfJoint], file: ClosureFile) -> Result<(), String> {
     // The file names links, or joints in the place of their child links.
     let place = |name: &str| -> Result<Option<usize>, String> {
         let joint = joints.iter().find(|joint| joint.name == name);
         let link = joint.map_or(name, |joint| joint.child.as_str());
         let index = out.links.iter().position(|link_| link_.name == link);
-        index.map(Some).ok_or_else(|| {
-            format!("the file of closures names `{name}`, which is neither a link nor a joint")
-        })
+        index
+            .map(Some)
+            .ok_or_else(|| format!("the file of closures names `{name}`, which is neither a link nor a joint"))
     };
     for closure in file.pairs {
         // The frames of both links coincide, or their origins only.

@@ -9,8 +9,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::description::{
-    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink,
-    RobotDescription,
+    ClosureConstraint, DescriptionClosure, DescriptionJoint, DescriptionJointKind, DescriptionLink, RobotDescription,
 };
 use super::placed::DescriptionPose;
 
@@ -34,10 +33,7 @@ struct LoopCut {
 impl LoopCut {
     /// Order of preference: one point before an axis, then few inverted links.
     fn rank(&self) -> (bool, usize) {
-        (
-            self.constraint != ClosureConstraint::Origins,
-            self.inverted_links.len(),
-        )
+        (self.constraint != ClosureConstraint::Origins, self.inverted_links.len())
     }
 }
 
@@ -79,11 +75,7 @@ fn ancestors(links: &[DescriptionLink], link: Option<usize>) -> Vec<usize> {
 }
 
 /// The joints between one end of a weld and the common ancestor at which the loop can be cut.
-fn possible_cuts(
-    description: &RobotDescription,
-    end: Option<usize>,
-    other: Option<usize>,
-) -> Vec<LoopCut> {
+fn possible_cuts(description: &RobotDescription, end: Option<usize>, other: Option<usize>) -> Vec<LoopCut> {
     let links = &description.links;
     // Joints above the common ancestor are not in the loop.
     let shared = ancestors(links, other);
@@ -99,12 +91,9 @@ fn possible_cuts(
         // Only links with at most one axis can be inverted.
         let joints = &links[link].joints;
         if joints.len() > 1
-            || joints.iter().any(|j| {
-                matches!(
-                    j.kind,
-                    DescriptionJointKind::Ball | DescriptionJointKind::Free
-                )
-            })
+            || joints
+                .iter()
+                .any(|j| matches!(j.kind, DescriptionJointKind::Ball | DescriptionJointKind::Free))
         {
             break;
         }
@@ -118,14 +107,8 @@ fn cut_below(description: &RobotDescription, turned: &[usize]) -> Option<LoopCut
     let may_go = |joint: &DescriptionJoint| {
         let mut couplings = description.couplings.iter();
         // The joint loses its coordinate, so that nothing may refer to it or act on it.
-        let is_coupled =
-            couplings.any(|c| c.joint == joint.name || c.leader.as_ref() == Some(&joint.name));
-        let acts = [
-            joint.damping,
-            joint.friction,
-            joint.armature,
-            joint.stiffness,
-        ];
+        let is_coupled = couplings.any(|c| c.joint == joint.name || c.leader.as_ref() == Some(&joint.name));
+        let acts = [joint.damping, joint.friction, joint.armature, joint.stiffness];
         !joint.is_driven && !is_coupled && acts.iter().all(|x| x.abs() <= 0.0)
     };
     // Joints upwards, each with its pose in the last link of `turned` while all joints are at zero.
@@ -220,10 +203,7 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
     let (_, here) = description.closures[closure].ends[end];
     let own = cut.inverted_links[cut.inverted_links.len() - 1];
     // Pose of the joint in its parent, past the massless links; all its joints are removed.
-    let parts: Vec<usize> = [own]
-        .into_iter()
-        .chain(cut.massless_links.iter().copied())
-        .collect();
+    let parts: Vec<usize> = [own].into_iter().chain(cut.massless_links.iter().copied()).collect();
     let mut carrier = None;
     let mut in_carrier = cut.at;
     let mut names = Vec::new();
@@ -232,12 +212,7 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
         in_carrier = link.at.compose(&in_carrier);
         carrier = link.parent;
         let joints = std::mem::take(&mut link.joints);
-        names.extend(
-            joints
-                .into_iter()
-                .rev()
-                .map(|joint| format!("`{}`", joint.name)),
-        );
+        names.extend(joints.into_iter().rev().map(|joint| format!("`{}`", joint.name)));
     }
     names.reverse();
     // Invert the chain: each link gets the inverse pose, and the joint of the link above it with the opposite axis.
@@ -273,11 +248,7 @@ fn apply_cut(description: &mut RobotDescription, closure: usize, end: usize, cut
         "line {line}: the loop is cut at {}, which {} no {} in the model",
         names.join(", "),
         if names.len() == 1 { "has" } else { "have" },
-        if names.len() == 1 {
-            "coordinate"
-        } else {
-            "coordinates"
-        },
+        if names.len() == 1 { "coordinate" } else { "coordinates" },
     );
     description.remarks.push(says);
 }
@@ -304,8 +275,7 @@ fn sort_links(description: &mut RobotDescription) {
             *link = link.map(place);
         }
     }
-    let mut links: Vec<(usize, DescriptionLink)> =
-        description.links.drain(..).enumerate().collect();
+    let mut links: Vec<(usize, DescriptionLink)> = description.links.drain(..).enumerate().collect();
     for (_, link) in &mut links {
         link.parent = link.parent.map(place);
     }

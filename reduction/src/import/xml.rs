@@ -14,8 +14,7 @@ pub(crate) fn children<'a, 'i>(
     of: &Node<'a, 'i>,
     tag: &'static str,
 ) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
-    of.children()
-        .filter(move |node| node.tag_name().name() == tag)
+    of.children().filter(move |node| node.tag_name().name() == tag)
 }
 
 /// The first child element with a tag; fails without one.
@@ -40,11 +39,7 @@ pub(crate) fn numbers(of: &Node, key: &str, text: &str) -> Result<Vec<f64>, Stri
 }
 
 /// Exactly `N` finite numbers of a text.
-pub(crate) fn exact_numbers<const N: usize>(
-    of: &Node,
-    key: &str,
-    text: &str,
-) -> Result<[f64; N], String> {
+pub(crate) fn exact_numbers<const N: usize>(of: &Node, key: &str, text: &str) -> Result<[f64; N], String> {
     let found = numbers(of, key, text)?;
     let n = found.len();
     found
@@ -83,9 +78,5 @@ pub(crate) fn located_message(node: &Node, fault: &str) -> String {
     let name = node
         .attribute("name")
         .map_or_else(String::new, |name| format!(" `{name}`"));
-    format!(
-        "line {}, <{}>{name}: {fault}",
-        line(node),
-        node.tag_name().name()
-    )
+    format!("line {}, <{}>{name}: {fault}", line(node), node.tag_name().name())
 }

@@ -1,9 +1,7 @@
 //! What is not exact is found and sized: each number here is worked out by hand.
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_reduction::{
-    PlanarReduction, ReductionFinding, default_plan, plan, reduce, sampled_forces,
-};
+use modelmill_reduction::{PlanarReduction, ReductionFinding, default_plan, plan, reduce, sampled_forces};
 use modelmill_rig::Rig;
 
 fn rig(text: &str) -> Rig {
@@ -77,10 +75,7 @@ fn finding(reduction: &PlanarReduction, about: &str, says: &str) -> ReductionFin
 }
 
 fn close(found: f64, expected: f64) {
-    assert!(
-        (found - expected).abs() < 1e-9,
-        "{found} instead of {expected}"
-    );
+    assert!((found - expected).abs() < 1e-9, "{found} instead of {expected}");
 }
 
 #[test]
@@ -118,20 +113,14 @@ fn sizes_are_those_worked_out_by_hand() {
         text.contains("Fs = { nominal = 4.0 }") && text.contains("constants = { vs = 0.1 }"),
         "{text}"
     );
-    assert!(
-        text.contains("m = { nominal = 2.3, unit = \"kg\""),
-        "{text}"
-    );
+    assert!(text.contains("m = { nominal = 2.3, unit = \"kg\""), "{text}");
 }
 
 /// Poses at which a reduction is checked are the same every time.
 #[test]
 fn a_reduction_is_the_same_every_time() {
     assert_eq!(reduced(), reduced());
-    let (one, two) = (
-        sampled_forces(&machine(), 20, 0.2),
-        sampled_forces(&machine(), 20, 0.2),
-    );
+    let (one, two) = (sampled_forces(&machine(), 20, 0.2), sampled_forces(&machine(), 20, 0.2));
     assert_eq!(one.expect("forces"), two.expect("forces"));
 }
 
@@ -162,14 +151,8 @@ fn a_rig_without_a_plan() {
     assert_eq!((mechanism.parts.len(), mechanism.loops.len()), (3, 1));
     let derivation = modelmill_codegen::derive(&mechanism).expect("a derivation");
     let sampled = sampled_forces(&rig, 40, 0.3).expect("forces");
-    let column = |of: fn(&modelmill_rig::RigState) -> f64| -> Vec<f64> {
-        sampled.iter().map(|(s, _)| of(s)).collect()
-    };
-    let (q, qd, qdd) = (
-        column(|s| s.q[0]),
-        column(|s| s.qd[0]),
-        column(|s| s.qdd[0]),
-    );
+    let column = |of: fn(&modelmill_rig::RigState) -> f64| -> Vec<f64> { sampled.iter().map(|(s, _)| of(s)).collect() };
+    let (q, qd, qdd) = (column(|s| s.q[0]), column(|s| s.qd[0]), column(|s| s.qdd[0]));
     let states = modelmill_codegen::MotionStates {
         q: vec![&q],
         qd: vec![&qd],
@@ -181,16 +164,10 @@ fn a_rig_without_a_plan() {
         .inverse_dynamics(&states, &derivation.nominal_base_values())
         .expect("forces");
     for (x, (_, y)) in found[0].iter().zip(&sampled) {
-        assert!(
-            (x - y[0]).abs() < 1e-8 * y[0].abs().max(1.0),
-            "{x} instead of {}",
-            y[0]
-        );
+        assert!((x - y[0]).abs() < 1e-8 * y[0].abs().max(1.0), "{x} instead of {}", y[0]);
     }
 
-    let says = default_plan(&machine())
-        .expect_err("a weld")
-        .in_library_words();
+    let says = default_plan(&machine()).expect_err("a weld").in_library_words();
     assert!(
         says.contains("`weld` is not a revolute joint") && says.contains("option `plan`"),
         "{says}"

@@ -62,8 +62,5 @@ fn a_screw_of_sdf_turns_and_slides() {
     let h = 0.005 / std::f64::consts::TAU;
     check(&mechanism, "spindle_2", "spindle", h, 0.0);
     let refused = import(&sdf(""), &ImportOptions::default()).expect_err("no pitch");
-    assert!(
-        refused.to_string().contains("screw_thread_pitch"),
-        "{refused}"
-    );
+    assert!(refused.to_string().contains("screw_thread_pitch"), "{refused}");
 }

@@ -13,9 +13,7 @@ use crate::lines;
 fn bundled(name: &str) -> Mechanism {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models");
     let loaded = modelmill_spec::load_file(&folder.join(format!("{name}.toml")));
-    loaded
-        .unwrap_or_else(|failure| panic!("{failure}"))
-        .mechanism
+    loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism
 }
 
 fn loaded(name: &str, text: &str) -> LoadedModel {
@@ -75,8 +73,8 @@ fn forces(mechanism: &Mechanism, motion: &[(String, [Vec<f64>; 3])]) -> Vec<(Str
 /// Writes a model in a format, reads it back, and holds forces along a motion against each other.
 fn there_and_back(mechanism: &Mechanism, format: ExportFormat) -> String {
     let exported = export(mechanism, format).expect("a description");
-    let imported = import(&exported.text, &ImportOptions::default())
-        .unwrap_or_else(|error| panic!("{error}\n{}", exported.text));
+    let imported =
+        import(&exported.text, &ImportOptions::default()).unwrap_or_else(|error| panic!("{error}\n{}", exported.text));
     let back = loaded("back.toml", &imported.model).mechanism;
     let moved = motion(mechanism, 25);
     // The importer may count a coordinate from elsewhere, or the other way.
@@ -160,10 +158,9 @@ fn drives_between_points_keep_their_forces() {
 /// Friction, inertia of drives and springs stand where the format has them; what it has not is said.
 #[test]
 fn effects_are_said_or_told() {
-    let text = std::fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models/two_link.toml"),
-    )
-    .expect("a model");
+    let text =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/models/two_link.toml"))
+            .expect("a model");
     let mechanism = loaded("two_link.toml", &text).mechanism;
     let drive = &mechanism.drives[0].name;
     let effect = |kind: &str, values: &str| {
@@ -177,11 +174,7 @@ fn effects_are_said_or_told() {
     ];
     let mechanism = loaded("two_link.toml", &(text + &more.concat())).mechanism;
     let mjcf = export(&mechanism, ExportFormat::Mjcf).expect("a description");
-    for said in [
-        "damping=\"0.5\"",
-        "frictionloss=\"1.5\"",
-        "armature=\"0.25\"",
-    ] {
+    for said in ["damping=\"0.5\"", "frictionloss=\"1.5\"", "armature=\"0.25\""] {
         assert_eq!(mjcf.text.matches(said).count(), 1, "{}", mjcf.text);
     }
     let urdf = export(&mechanism, ExportFormat::Urdf).expect("a description");
@@ -205,9 +198,7 @@ fn bodies_can_be() {
     let mut arm = bundled("puma560");
     let mass = arm.parameters.iter_mut().find(|one| one.unit == "kg");
     mass.expect("a mass").nominal = -1.0;
-    let remarks = export(&arm, ExportFormat::Urdf)
-        .expect("a description")
-        .remarks;
+    let remarks = export(&arm, ExportFormat::Urdf).expect("a description").remarks;
     let remarks = lines(&remarks);
     assert!(remarks.contains("has no mass above zero"), "{remarks}");
 }

@@ -19,8 +19,7 @@ fn rig() -> Rig {
 }
 
 fn reduced() -> PlanarReduction {
-    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
-        .unwrap_or_else(|f| panic!("{f}"));
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml")).unwrap_or_else(|f| panic!("{f}"));
     reduce(&rig(), &plan).unwrap_or_else(|failure| panic!("{failure}"))
 }
 
@@ -32,9 +31,7 @@ fn derived(text: &str) -> Derivation {
 }
 
 fn bundled() -> Derivation {
-    derived(
-        &std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"),
-    )
+    derived(&std::fs::read_to_string(workspace("model-spec/models/spidermill.toml")).expect("a model"))
 }
 
 #[test]
@@ -71,11 +68,7 @@ fn the_base_parameters_are_those_of_the_bundled_model() {
         base.map(|base| (base.name, base.expression)).collect()
     };
     assert_eq!(expressions(&ours), expressions(&theirs));
-    for (x, y) in ours
-        .nominal_base_values()
-        .iter()
-        .zip(theirs.nominal_base_values())
-    {
+    for (x, y) in ours.nominal_base_values().iter().zip(theirs.nominal_base_values()) {
         assert!((x - y).abs() < 1e-9 * y.abs(), "{x} {y}");
     }
 }
@@ -100,8 +93,7 @@ fn rods_and_coupled_drives_go_over() {
         rig.effects
             .push(effect.unwrap_or_else(|faults| panic!("{}", faults[0])));
     }
-    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml"))
-        .unwrap_or_else(|f| panic!("{f}"));
+    let plan = plan_file(&workspace("model-spec/rigs/spidermill-plan.toml")).unwrap_or_else(|f| panic!("{f}"));
     let reduced = reduce(&rig, &plan).unwrap_or_else(|failure| panic!("{failure}"));
     holds_the_forces(&rig, &reduced);
 }
@@ -114,10 +106,7 @@ fn holds_the_forces(rig: &Rig, reduced: &PlanarReduction) {
     for i in 0..60 {
         let wave = |k: f64| (k * f64::from(i)).sin();
         let state = RigState {
-            q: vec![
-                1.8 + 0.2 * wave(0.7),
-                1.341_592_653_589_793 + 0.2 * wave(1.1),
-            ],
+            q: vec![1.8 + 0.2 * wave(0.7), 1.341_592_653_589_793 + 0.2 * wave(1.1)],
             qd: vec![wave(1.9), wave(2.3)],
             qdd: vec![5.0 * wave(2.9), 5.0 * wave(3.1)],
         };
@@ -141,11 +130,7 @@ fn holds_the_forces(rig: &Rig, reduced: &PlanarReduction) {
         .inverse_dynamics(&states, &values)
         .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {
-        let error: f64 = found
-            .iter()
-            .zip(expected)
-            .map(|(x, y)| (x - y).powi(2))
-            .sum();
+        let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
         let norm: f64 = expected.iter().map(|y| y * y).sum();
         let relative = (error / norm).sqrt();
         println!("reduced model against rig: {relative:.1e}");
@@ -162,9 +147,7 @@ fn the_report_names_every_approximation() {
             .findings
             .iter()
             .find(|f| f.about == about && f.says.contains(says));
-        found
-            .unwrap_or_else(|| panic!("nothing about {about} {says}"))
-            .clone()
+        found.unwrap_or_else(|| panic!("nothing about {about} {says}")).clone()
     };
     // Step 1: the end effector is mounted beside the plane, as the paper says.
     let platform = finding("G4", "not halved");
@@ -176,17 +159,9 @@ fn the_report_names_every_approximation() {
             .all(|size| !size.is_significant())
     );
     // Step 2: eq. (1) holds for the cranks, not for the coupling, which only translates.
-    assert!(
-        finding("S1", "50.9597")
-            .sizes
-            .iter()
-            .all(|size| !size.is_significant())
-    );
+    assert!(finding("S1", "50.9597").sizes.iter().all(|size| !size.is_significant()));
     let elbow = finding("elbow_left", "only translates");
-    assert!(
-        !elbow.sizes[0].is_significant()
-            && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9
-    );
+    assert!(!elbow.sizes[0].is_significant() && (elbow.sizes[1].value - 0.018_f64.hypot(0.062)).abs() < 1e-9);
     // A point mass has no inertia about itself.
     assert!((elbow.sizes[2].value - 0.12).abs() < 1e-9);
     // Step 3: both sides are alike.

@@ -48,22 +48,13 @@ fn rig() -> modelmill_rig::Rig {
     use nalgebra::{Rotation3, Vector3};
     let rpy = |r: f64, p: f64, y: f64| Rotation3::from_euler_angles(r, p, y);
     // Zero poses, joint after joint. The importer takes 1.5708 for a right angle.
-    let (upper, p_upper) = (
-        rpy(0.0, std::f64::consts::FRAC_PI_2, 0.0),
-        Vector3::new(0.0, 0.0, 0.4),
-    );
+    let (upper, p_upper) = (rpy(0.0, std::f64::consts::FRAC_PI_2, 0.0), Vector3::new(0.0, 0.0, 0.4));
     let (fore, p_fore) = (
         upper * rpy(0.2, 0.0, -0.5),
         p_upper + upper * Vector3::new(0.4, 0.1, 0.0),
     );
-    let (tool, p_tool) = (
-        fore * rpy(0.0, 0.7, 0.0),
-        p_fore + fore * Vector3::new(0.3, 0.0, 0.05),
-    );
-    let (slide, p_slide) = (
-        tool * rpy(0.0, 0.0, 0.1),
-        p_tool + tool * Vector3::new(0.0, 0.0, 0.1),
-    );
+    let (tool, p_tool) = (fore * rpy(0.0, 0.7, 0.0), p_fore + fore * Vector3::new(0.3, 0.0, 0.05));
+    let (slide, p_slide) = (tool * rpy(0.0, 0.0, 0.1), p_tool + tool * Vector3::new(0.0, 0.0, 0.1));
     let list = |v: Vector3<f64>| format!("[{}, {}, {}]", v.x, v.y, v.z);
     // A frame in the inertial's own axes saves turning the inertia.
     let body = |name: &str, r: Rotation3<f64>, p: Vector3<f64>, rest: &str| {
@@ -119,13 +110,7 @@ fn rig() -> modelmill_rig::Rig {
         p_fore,
         fore * Vector3::new(0.0, 0.6, 0.8),
     );
-    text += &joint(
-        "grip",
-        "fixed",
-        "[\"fore\", \"tool\"]",
-        p_tool,
-        Vector3::z(),
-    );
+    text += &joint("grip", "fixed", "[\"fore\", \"tool\"]", p_tool, Vector3::z());
     text += &joint(
         "quill_joint",
         "prismatic",
@@ -133,9 +118,8 @@ fn rig() -> modelmill_rig::Rig {
         p_slide,
         slide * Vector3::y(),
     );
-    let named = |table: &str, name: &str, joint: &str| {
-        format!("[[{table}]]\nname = \"{name}\"\njoint = \"{joint}_joint\"\n")
-    };
+    let named =
+        |table: &str, name: &str, joint: &str| format!("[[{table}]]\nname = \"{name}\"\njoint = \"{joint}_joint\"\n");
     for name in ["shoulder", "elbow", "quill"] {
         text.push_str(&named("coordinate", name, name));
     }
@@ -150,12 +134,7 @@ fn rig() -> modelmill_rig::Rig {
 
 fn derived(text: &str) -> Derivation {
     let loaded = modelmill_spec::load("model.toml", text, &MemoryFiles::default());
-    modelmill_codegen::derive(
-        &loaded
-            .unwrap_or_else(|failure| panic!("{failure}"))
-            .mechanism,
-    )
-    .expect("a derivation")
+    modelmill_codegen::derive(&loaded.unwrap_or_else(|failure| panic!("{failure}")).mechanism).expect("a derivation")
 }
 
 #[test]
@@ -206,16 +185,12 @@ fn an_imported_arm_has_the_forces_of_its_rig() {
         .expect("forces");
     for (found, expected) in found.iter().zip(&expected) {
         for (x, y) in found.iter().zip(expected) {
-            assert!(
-                (x - y).abs() < 1e-8 * y.abs().max(1.0),
-                "{x} instead of {y}"
-            );
+            assert!((x - y).abs() < 1e-8 * y.abs().max(1.0), "{x} instead of {y}");
         }
     }
     let says = lines(&imported.remarks);
     assert!(
-        says.contains("1.5708 rad, is rounded to pi/2 (difference 0.0000037 rad)")
-            || says.contains("3.7e-6"),
+        says.contains("1.5708 rad, is rounded to pi/2 (difference 0.0000037 rad)") || says.contains("3.7e-6"),
         "{says}"
     );
     assert!(says.contains("`foot` does not move"), "{says}");
@@ -235,31 +210,14 @@ fn what_makes_no_model_is_said() {
     assert!(says("").contains("not a readable URDF"));
     assert!(says("schema = 1").contains("not a readable URDF"));
     assert!(says("<robot name='r'><link name='a'/></robot>").contains("no joint that moves"));
-    let two =
-        |joints: &str| format!("<robot name='r'><link name='a'/><link name='b'/>{joints}</robot>");
+    let two = |joints: &str| format!("<robot name='r'><link name='a'/><link name='b'/>{joints}</robot>");
     let joint = |name: &str, kind: &str, parent: &str, child: &str, more: &str| {
-        format!(
-            "<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{more}</joint>"
-        )
+        format!("<joint name='{name}' type='{kind}'><parent link='{parent}'/><child link='{child}'/>{more}</joint>")
     };
     assert!(says(&two("")).contains("are both without a parent"));
-    assert!(
-        says(&two(&joint("j", "revolute", "a", "c", ""))).contains("`c`, which does not exist")
-    );
-    assert!(
-        says(&two(&joint("j", "planar", "a", "b", "")))
-            .contains("the joint type planar is not supported")
-    );
-    assert!(
-        says(&two(&joint(
-            "j",
-            "revolute",
-            "a",
-            "b",
-            "<axis xyz='0 0 0'/>"
-        )))
-        .contains("no direction")
-    );
+    assert!(says(&two(&joint("j", "revolute", "a", "c", ""))).contains("`c`, which does not exist"));
+    assert!(says(&two(&joint("j", "planar", "a", "b", ""))).contains("the joint type planar is not supported"));
+    assert!(says(&two(&joint("j", "revolute", "a", "b", "<axis xyz='0 0 0'/>"))).contains("no direction"));
     let ring = joint("j", "revolute", "a", "b", "") + &joint("k", "revolute", "b", "a", "");
     assert!(says(&two(&ring)).contains("there is no root link"));
     let twice = joint("j", "revolute", "a", "b", "") + &joint("k", "revolute", "a", "b", "");
@@ -279,9 +237,7 @@ fn unfinished_descriptions_give_an_answer() {
         .filter_map(|k| ARM.get(..k).map(str::to_owned));
     let odd = ["\"4\"", "\"0.2 0 0\"", "\"upper\"", "revolute", "xyz"]
         .into_iter()
-        .flat_map(|old| {
-            ["\"\"", "\"nan\"", "\"1e999 0 0\"", "\"-\""].map(|new| ARM.replace(old, new))
-        });
+        .flat_map(|old| ["\"\"", "\"nan\"", "\"1e999 0 0\"", "\"-\""].map(|new| ARM.replace(old, new)));
     let mut sound = 0;
     for unfinished in without.chain(cut).chain(odd) {
         match import(&unfinished, &ImportOptions::default()) {

@@ -24,8 +24,7 @@ fn message(name: &str) -> String {
             Err(error) => format!("{error}\n"),
         },
         Err(failure) => {
-            let named =
-                |found: &modelmill_spec::Diagnostic| found.span.is_some() || name == "empty.toml";
+            let named = |found: &modelmill_spec::Diagnostic| found.span.is_some() || name == "empty.toml";
             assert!(
                 failure.diagnostics.iter().all(named),
                 "{name}: a finding without its place"
@@ -39,13 +38,7 @@ fn message(name: &str) -> String {
 fn messages() {
     let mut names: Vec<String> = std::fs::read_dir(folder())
         .expect("fixtures")
-        .map(|entry| {
-            entry
-                .expect("a file")
-                .file_name()
-                .to_string_lossy()
-                .into_owned()
-        })
+        .map(|entry| entry.expect("a file").file_name().to_string_lossy().into_owned())
         .filter(|name| Path::new(name).extension().is_some_and(|end| end == "toml"))
         .collect();
     names.sort();
@@ -60,11 +53,7 @@ fn messages() {
 #[test]
 fn a_file_that_cannot_be_read() {
     let failure = modelmill_rig::load_file(Path::new("no/such/rig.toml")).expect_err("no file");
-    assert!(
-        failure
-            .render(false)
-            .contains("cannot read `no/such/rig.toml`")
-    );
+    assert!(failure.render(false).contains("cannot read `no/such/rig.toml`"));
 }
 
 #[test]
@@ -72,13 +61,7 @@ fn a_file_of_megabytes_and_one_of_nonsense() {
     let none = &MemoryFiles::default();
     let huge = load("rig.toml", &"x".repeat(5 << 20), none).expect_err("too large");
     assert!(huge.render(false).contains("too large"));
-    for text in [
-        "\u{0}\u{1}",
-        "= = =",
-        "schema = 1\nname = 1",
-        "[[[[",
-        "name = \"\\q\"",
-    ] {
+    for text in ["\u{0}\u{1}", "= = =", "schema = 1\nname = 1", "[[[[", "name = \"\\q\""] {
         assert!(load("rig.toml", text, none).is_err(), "{text:?}");
     }
 }
@@ -86,8 +69,7 @@ fn a_file_of_megabytes_and_one_of_nonsense() {
 /// Files that someone is still writing: cut anywhere, or with a line left out, they give an answer and no panic.
 #[test]
 fn unfinished_files_give_an_answer() {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-spec/rigs/spidermill-full.toml");
     let text = std::fs::read_to_string(path).expect("a rig");
     let none = &MemoryFiles::default();
     let mut sound = 0;

@@ -64,11 +64,7 @@ fn a_slider_crank() {
             qd: vec![qd],
             qdd: vec![qdd],
         };
-        close(
-            force(&rig, &mut tracker, &state)[0],
-            0.2 * qdd + slider + pin,
-            1e-10,
-        );
+        close(force(&rig, &mut tracker, &state)[0], 0.2 * qdd + slider + pin, 1e-10);
     }
 }
 
@@ -146,13 +142,7 @@ fn a_cylindrical_joint_has_two_freedoms() {
 fn power_balances_energy() {
     let mut rig = crate::common::load("spidermill-with-rods");
     let motion = |t: f64| {
-        let wave = |a: f64, w: f64| {
-            [
-                a * (w * t).sin(),
-                a * w * (w * t).cos(),
-                -a * w * w * (w * t).sin(),
-            ]
-        };
+        let wave = |a: f64, w: f64| [a * (w * t).sin(), a * w * (w * t).cos(), -a * w * w * (w * t).sin()];
         let [one, two] = [wave(0.2, 3.0), wave(-0.15, 4.0)];
         RigState {
             q: vec![1.8 + one[0], 1.341_592_653_589_793 + two[0]],
@@ -163,17 +153,9 @@ fn power_balances_energy() {
     for (kind, at, values) in [
         ("point_mass", "R3m", vec![("m", 5.0)]),
         ("gravity_tilt", "base", vec![("tz", 0.05)]),
-        (
-            "rod_inertia",
-            "spindle_left",
-            vec![("m", 4.0), ("c", 0.3), ("I", 0.2)],
-        ),
+        ("rod_inertia", "spindle_left", vec![("m", 4.0), ("c", 0.3), ("I", 0.2)]),
         ("viscous_friction", "spindle_right", vec![("Fv", 900.0)]),
-        (
-            "viscous_friction",
-            "coupler_left_beside",
-            vec![("Fv", 30.0)],
-        ),
+        ("viscous_friction", "coupler_left_beside", vec![("Fv", 30.0)]),
     ] {
         let effect = rig.effect(kind, &[at], &values).expect("an effect");
         rig.effects.push(effect);
@@ -184,15 +166,13 @@ fn power_balances_energy() {
     for t in [0.1, 0.45, 0.7, 1.3] {
         let mut at = |t: f64| tracker.follow(&motion(t)).expect("inside the workspace");
         let energies = [-2.0, -1.0, 1.0, 2.0].map(|k| energy(&rig, &at(t + k * h)));
-        let growth =
-            (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h);
+        let growth = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h);
         let now = at(t);
         let mut balance = -growth;
         for (force, place) in forces(&rig, &now).expect("forces").iter().zip([0, 1]) {
-            let rate =
-                modelmill_rig::place_motion(&rig, modelmill_rig::RigPlace::Drive(place), &now)
-                    .expect("a drive")
-                    .rate;
+            let rate = modelmill_rig::place_motion(&rig, modelmill_rig::RigPlace::Drive(place), &now)
+                .expect("a drive")
+                .rate;
             balance += force * rate;
             largest = largest.max((force * rate).abs());
         }
@@ -204,10 +184,7 @@ fn power_balances_energy() {
                     .rate
                     .powi(2);
         }
-        assert!(
-            balance.abs() < 1e-6 * largest,
-            "{balance} of {largest} at {t}"
-        );
+        assert!(balance.abs() < 1e-6 * largest, "{balance} of {largest} at {t}");
     }
 }
 
@@ -222,10 +199,7 @@ fn the_past_of_a_tracker_does_not_show() {
         // Jumps across the workspace, and between them steps as small as those of a recording.
         let reach = if i % 4 == 0 { 0.6 } else { 0.004 };
         let state = RigState {
-            q: vec![
-                1.8 + reach * draw.q[0],
-                1.341_592_653_589_793 + reach * draw.q[1],
-            ],
+            q: vec![1.8 + reach * draw.q[0], 1.341_592_653_589_793 + reach * draw.q[1]],
             ..draw
         };
         let kept = force(&rig, &mut used, &state);

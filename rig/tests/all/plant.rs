@@ -16,10 +16,7 @@ fn rig(name: &str) -> Rig {
 fn accelerations_are_those_whose_forces_were_given() {
     // With rods and dry friction: forces depend on rates and accelerations in many ways.
     let rig = rig("spidermill-worn");
-    for (k, qdd) in [[0.0, 0.0], [3.0, -1.0], [-7.0, 12.0]]
-        .into_iter()
-        .enumerate()
-    {
+    for (k, qdd) in [[0.0, 0.0], [3.0, -1.0], [-7.0, 12.0]].into_iter().enumerate() {
         let state = RigState {
             q: vec![1.8 + 0.05 * k as f64, 1.34],
             qd: vec![0.4, -0.3],
@@ -30,10 +27,7 @@ fn accelerations_are_those_whose_forces_were_given() {
         let mut plant = RigPlant::new(&rig, &state.q, &state.qd).unwrap();
         let found = plant.accelerations(&given).unwrap();
         for (found, expected) in found.iter().zip(qdd) {
-            assert!(
-                (found - expected).abs() < 1e-8,
-                "{found} instead of {expected}"
-            );
+            assert!((found - expected).abs() < 1e-8, "{found} instead of {expected}");
         }
     }
 }
@@ -63,10 +57,7 @@ fn what_moves_by_itself_keeps_its_energy() {
 fn forces_of_another_number_are_refused() {
     let rig = rig("spidermill-full");
     let mut plant = RigPlant::new(&rig, &[1.8, 1.341_593], &[0.0, 0.0]).unwrap();
-    let fault = PlantError::Count {
-        found: 1,
-        expected: 2,
-    };
+    let fault = PlantError::Count { found: 1, expected: 2 };
     assert_eq!(plant.step(&[0.0], 0.01), Err(fault.clone()));
     assert_eq!(RigPlant::new(&rig, &[1.8], &[0.0, 0.0]).err(), Some(fault));
     let far = RigPlant::new(&rig, &[1.8, 5.0], &[0.0, 0.0]).err();

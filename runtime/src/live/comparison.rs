@@ -59,11 +59,7 @@ impl<T: Real, const NB: usize> WindowComparison<T, NB> {
     }
 
     /// Starts with copies of a window and a reference.
-    pub(super) fn start(
-        &mut self,
-        reference: &RecursiveEstimator<T, NB>,
-        window: &RecursiveEstimator<T, NB>,
-    ) {
+    pub(super) fn start(&mut self, reference: &RecursiveEstimator<T, NB>, window: &RecursiveEstimator<T, NB>) {
         self.both = reference.rows;
         self.values = reference.values;
         self.change = [[T::from_f64(0.0); NB]; NB];
@@ -128,11 +124,7 @@ impl<T: Real, const NB: usize> WindowComparison<T, NB> {
     }
 
     /// The same for a second change in addition to that of parameter `first`.
-    pub(super) fn second_changes(
-        &self,
-        first: usize,
-        singles: &[ChangeScore<T>; NB],
-    ) -> [ChangeScore<T>; NB] {
+    pub(super) fn second_changes(&self, first: usize, singles: &[ChangeScore<T>; NB]) -> [ChangeScore<T>; NB] {
         let zero = T::from_f64(0.0);
         let mut common = [zero; NB];
         for row in &self.window {

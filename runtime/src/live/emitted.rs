@@ -20,11 +20,7 @@ macro_rules! watch {
 
         impl<T: Real> Watch<T> {
             /// A watch that starts to learn; `base` are the base parameters in use.
-            pub fn new(
-                geometry: &Geometry<T>,
-                base: &[T; N_BASE],
-                options: &$crate::live::Options,
-            ) -> Self {
+            pub fn new(geometry: &Geometry<T>, base: &[T; N_BASE], options: &$crate::live::Options) -> Self {
                 Self {
                     model: Model::new(geometry),
                     live: $crate::live::ParameterWatch::new(base, options),

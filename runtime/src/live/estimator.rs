@@ -162,11 +162,7 @@ impl<T: Real, const NB: usize> RecursiveEstimator<T, NB> {
 }
 
 /// Cosine and sine of the rotation that eliminates entry `k` of a row with that of the R factor; `None` if it is zero.
-pub(super) fn givens_rotation<T: Real, const N: usize>(
-    own: &[T; N],
-    row: &[T; N],
-    k: usize,
-) -> Option<(T, T)> {
+pub(super) fn givens_rotation<T: Real, const N: usize>(own: &[T; N], row: &[T; N], k: usize) -> Option<(T, T)> {
     let (a, b) = (*own.get(k)?, *row.get(k)?);
     let length = (a * a + b * b).sqrt();
     // The squares of very small numbers underflow to zero.
@@ -175,13 +171,7 @@ pub(super) fn givens_rotation<T: Real, const N: usize>(
 
 /// Rotates two rows in their plane, from entry `from` on.
 #[inline]
-pub(super) fn rotate_rows<T: Real, const N: usize>(
-    c: T,
-    s: T,
-    own: &mut [T; N],
-    row: &mut [T; N],
-    from: usize,
-) {
+pub(super) fn rotate_rows<T: Real, const N: usize>(c: T, s: T, own: &mut [T; N], row: &mut [T; N], from: usize) {
     let (Some(own), Some(row)) = (own.get_mut(from..), row.get_mut(from..)) else {
         return;
     };
@@ -201,18 +191,11 @@ mod tests {
     fn sample(random: &mut Random) -> ([f64; N], f64) {
         let row = core::array::from_fn(|_| random.uniform(-1.0, 1.0));
         let noise = random.uniform(-0.3, 0.3);
-        (
-            row,
-            row[0] - 2.0 * row[1] + 0.5 * row[2] + 3.0 * row[3] + noise,
-        )
+        (row, row[0] - 2.0 * row[1] + 0.5 * row[2] + 3.0 * row[3] + noise)
     }
 
     /// The normal equations of weighted rows and a prior, by the elimination of the runtime.
-    fn batch(
-        rows: &[([f64; N], f64)],
-        weight: impl Fn(usize) -> f64,
-        prior: &EstimatorPrior<f64, N>,
-    ) -> [f64; N] {
+    fn batch(rows: &[([f64; N], f64)], weight: impl Fn(usize) -> f64, prior: &EstimatorPrior<f64, N>) -> [f64; N] {
         let (mut matrix, mut right) = ([[0.0; N]; N], [0.0; N]);
         for (age, (row, value)) in rows.iter().rev().enumerate() {
             for i in 0..N {
@@ -309,9 +292,7 @@ mod tests {
         let mut estimator = RecursiveEstimator::<f64, 2>::new();
         assert!(!estimator.add([1.0, f64::NAN], 1.0));
         assert!(!estimator.add([1.0, 1.0], f64::INFINITY));
-        let nothing = estimator
-            .solve(&EstimatorPrior::uninformative())
-            .map(f64::to_bits);
+        let nothing = estimator.solve(&EstimatorPrior::uninformative()).map(f64::to_bits);
         assert_eq!(nothing, [0.0_f64.to_bits(); 2]);
     }
 }

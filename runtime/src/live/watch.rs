@@ -235,11 +235,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         let means = {
             let nominal = &self.nominal;
             let mut drives = self.drives.iter_mut();
-            [(); NQ].map(|()| {
-                drives
-                    .next()
-                    .and_then(|drive| drive.end_block(share, nominal))
-            })
+            [(); NQ].map(|()| drives.next().and_then(|drive| drive.end_block(share, nominal)))
         };
         let n_counted = means.iter().flatten().count();
         self.left_out += (NQ - n_counted) as u64;
@@ -288,12 +284,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
     fn advance_stage(&mut self) {
         match self.stage {
             WatchStage::Noise if self.has_noise() => {
-                for ((drive, counted), watched) in self
-                    .drives
-                    .iter_mut()
-                    .zip(&self.counted)
-                    .zip(&mut self.watched)
-                {
+                for ((drive, counted), watched) in self.drives.iter_mut().zip(&self.counted).zip(&mut self.watched) {
                     *watched = *counted >= self.plan.noise;
                     drive.update_noise_model();
                 }
@@ -334,11 +325,7 @@ impl<T: Real, const NB: usize, const NQ: usize> ParameterWatch<T, NB, NQ> {
         match (&self.verdict, found) {
             (WatchVerdict::Changed(before), Some(mut change)) => {
                 let is_same = change.parameter == before.parameter;
-                self.same = if is_same {
-                    self.same.saturating_add(1)
-                } else {
-                    0
-                };
+                self.same = if is_same { self.same.saturating_add(1) } else { 0 };
                 change.steady = self.same >= self.plan.steady;
                 self.verdict = WatchVerdict::Changed(change);
             }

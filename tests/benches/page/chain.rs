@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use modelmill_spec::{
-    CoordinateIdx, DriveKind, ExactExpression, FrameAxis, FrameIdx, FrameStep, LumpedMass,
-    Mechanism, ModelPart, ModelSymbol, PartInertia,
+    CoordinateIdx, DriveKind, ExactExpression, FrameAxis, FrameIdx, FrameStep, LumpedMass, Mechanism, ModelPart,
+    ModelSymbol, PartInertia,
 };
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -71,18 +71,12 @@ impl Body {
 
 impl Chain {
     /// The chain of a mechanism with given values of its parameters; the reason why there is none.
-    pub(crate) fn from_mechanism(
-        mechanism: &Mechanism,
-        parameters: &[f64],
-    ) -> Result<Self, String> {
+    pub(crate) fn from_mechanism(mechanism: &Mechanism, parameters: &[f64]) -> Result<Self, String> {
         if !mechanism.loops.is_empty() || mechanism.coordinates.iter().any(|c| c.passive) {
             return Err("it has loops".to_owned());
         }
         let drives = mechanism.drives.iter().map(|d| &d.kind);
-        if drives
-            .clone()
-            .any(|kind| !matches!(kind, DriveKind::Joint(_)))
-        {
+        if drives.clone().any(|kind| !matches!(kind, DriveKind::Joint(_))) {
             return Err("a drive acts between points".to_owned());
         }
         if mechanism.effects.iter().any(|e| e.mechanics.is_some()) {
@@ -237,10 +231,7 @@ fn elementary(
     Ok((axis, slides, offset, moved))
 }
 
-fn symmetric(
-    entries: &[ExactExpression; 6],
-    number: &dyn Fn(&ExactExpression) -> f64,
-) -> Matrix3<f64> {
+fn symmetric(entries: &[ExactExpression; 6], number: &dyn Fn(&ExactExpression) -> f64) -> Matrix3<f64> {
     let [xx, xy, xz, yy, yz, zz] = std::array::from_fn(|i| number(&entries[i]));
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
@@ -257,11 +248,7 @@ fn part(part: &ModelPart, number: &dyn Fn(&ExactExpression) -> f64) -> Body {
             moment: vector(first_moment),
             inertia: symmetric(inertia, number),
         },
-        PartInertia::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
+        PartInertia::AboutCentre { mass, centre, inertia } => {
             let about_centre = Body {
                 mass: number(mass),
                 moment: Vector3::zeros(),
@@ -275,17 +262,13 @@ fn part(part: &ModelPart, number: &dyn Fn(&ExactExpression) -> f64) -> Body {
     }
 }
 
-fn lumped_mass(
-    mass: &LumpedMass,
-    number: &dyn Fn(&ExactExpression) -> f64,
-) -> Result<Body, String> {
+fn lumped_mass(mass: &LumpedMass, number: &dyn Fn(&ExactExpression) -> f64) -> Result<Body, String> {
     let vector = |v: &[ExactExpression; 3]| Vector3::from_fn(|i, _| number(&v[i]));
     let (position, other) = (vector(&mass.force_at), vector(&mass.moment_at));
     if position != other {
         return Err("forces and moments see a mass at different places".to_owned());
     }
-    let ratio =
-        |n: &num_rational::BigRational| ExactExpression::Rational(n.clone()).evaluate(&|_| 0.0);
+    let ratio = |n: &num_rational::BigRational| ExactExpression::Rational(n.clone()).evaluate(&|_| 0.0);
     let point = Body {
         mass: number(&mass.mass) * ratio(&mass.share),
         ..Body::default()

@@ -1,8 +1,8 @@
 //! Mechanisms taken off their base: everything that stood on it hangs on a body that nothing holds.
 
 use modelmill_spec::{
-    CoordinateIdx, CoordinateMotion, DriveKind, FrameConvention, FrameIdx, FrameStep, FreeBody,
-    JointCoordinate, Mechanism, ModelDrive, ModelFrame, TwistAxes,
+    CoordinateIdx, CoordinateMotion, DriveKind, FrameConvention, FrameIdx, FrameStep, FreeBody, JointCoordinate,
+    Mechanism, ModelDrive, ModelFrame, TwistAxes,
 };
 
 /// The mechanism with a free body between base and all else, which carries what the base did.
@@ -56,23 +56,11 @@ pub fn hung_free(mut mechanism: Mechanism, linear: TwistAxes, angular: TwistAxes
     let bodies = effects.map(|effect| &mut effect.bodies);
     for bodies in bodies {
         bodies.parts.iter_mut().for_each(|part| up(&mut part.frame));
-        bodies
-            .lumped_masses
-            .iter_mut()
-            .for_each(|mass| up(&mut mass.frame));
+        bodies.lumped_masses.iter_mut().for_each(|mass| up(&mut mass.frame));
     }
-    mechanism
-        .points
-        .iter_mut()
-        .for_each(|point| up(&mut point.frame));
-    mechanism
-        .parts
-        .iter_mut()
-        .for_each(|part| up(&mut part.frame));
-    mechanism
-        .lumped_masses
-        .iter_mut()
-        .for_each(|mass| up(&mut mass.frame));
+    mechanism.points.iter_mut().for_each(|point| up(&mut point.frame));
+    mechanism.parts.iter_mut().for_each(|part| up(&mut part.frame));
+    mechanism.lumped_masses.iter_mut().for_each(|mass| up(&mut mass.frame));
     mechanism.name = format!("free_{}", mechanism.name);
     mechanism
 }

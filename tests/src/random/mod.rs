@@ -9,11 +9,10 @@ pub use planar_loop::{planar_loop, regularity_at};
 pub use tree::tree;
 
 use modelmill_spec::{
-    ConstantIdx, CoordinateIdx, CoordinateMotion, DriveIdx, DriveKind, DynamicParameter,
-    EffectBodies, EffectPlace, EffectTerm, ExactExpression, ExactFunction, ExactLength, FrameAxis,
-    FrameConvention, FrameIdx, FramePoint, FrameStep, JointCoordinate, LumpedMass, Mechanism,
-    ModelConstant, ModelDrive, ModelEffect, ModelFrame, ModelPart, ModelSymbol, MotionLimits,
-    ParameterIdx, PartInertia, PlaceQuantity, PointIdx, RecordingColumns,
+    ConstantIdx, CoordinateIdx, CoordinateMotion, DriveIdx, DriveKind, DynamicParameter, EffectBodies, EffectPlace,
+    EffectTerm, ExactExpression, ExactFunction, ExactLength, FrameAxis, FrameConvention, FrameIdx, FramePoint,
+    FrameStep, JointCoordinate, LumpedMass, Mechanism, ModelConstant, ModelDrive, ModelEffect, ModelFrame, ModelPart,
+    ModelSymbol, MotionLimits, ParameterIdx, PartInertia, PlaceQuantity, PointIdx, RecordingColumns,
 };
 use nalgebra::{Matrix3, Vector3};
 use num_rational::BigRational;
@@ -113,9 +112,7 @@ impl Draft {
         }
         let gap = *self.stream.pick(&GAPS);
         let others = self.mechanism.constants.iter();
-        let others: Vec<f64> = (others.filter(|c| c.unit == unit))
-            .map(|c| c.value)
-            .collect();
+        let others: Vec<f64> = (others.filter(|c| c.unit == unit)).map(|c| c.value).collect();
         match self.stream.below(10) {
             0..4 if !others.is_empty() => {
                 let other = *self.stream.pick(&others);
@@ -229,11 +226,7 @@ impl Draft {
             inertia += m * (at.norm_squared() * Matrix3::identity() - at * at.transpose());
         }
         let mut entry = |name: &str, value: f64, matters: bool| {
-            if matters {
-                self.symbol(name, value)
-            } else {
-                ZERO()
-            }
+            if matters { self.symbol(name, value) } else { ZERO() }
         };
         let inertia = [
             entry("XX", inertia[(0, 0)], !planar),
@@ -279,18 +272,12 @@ impl Draft {
                     self.symbol("I", value)
                 }
             });
-            return PartInertia::AboutCentre {
-                mass,
-                centre,
-                inertia,
-            };
+            return PartInertia::AboutCentre { mass, centre, inertia };
         }
         let mut inertial = self.whole_body(planar);
         if self.stream.chance(0.4)
             && let PartInertia::Linear {
-                first_moment,
-                inertia,
-                ..
+                first_moment, inertia, ..
             } = &mut inertial
         {
             for entry in first_moment.iter_mut().chain(inertia) {
@@ -325,11 +312,7 @@ impl Draft {
             let inertial = self.whole_body(planar);
             let frame = FrameIdx(self.mechanism.frames.len() - 1);
             let name = "part".to_owned();
-            self.mechanism.parts.push(ModelPart {
-                name,
-                frame,
-                inertial,
-            });
+            self.mechanism.parts.push(ModelPart { name, frame, inertial });
         }
     }
 
@@ -408,17 +391,11 @@ impl Draft {
                 let point = self.point(frame, at);
                 let value = self.stream.between(0.2, 1.0);
                 let parameter = self.parameter("dm", value);
-                self.effect(
-                    "point_mass",
-                    vec![EffectPlace::Point(point)],
-                    parameter,
-                    number(1),
-                );
+                self.effect("point_mass", vec![EffectPlace::Point(point)], parameter, number(1));
                 continue;
             }
             let symbol = |quantity| ExactExpression::Symbol(ModelSymbol::Place(quantity));
-            let sign =
-                ExactExpression::Apply(ExactFunction::Sign, Box::new(symbol(PlaceQuantity::Rate)));
+            let sign = ExactExpression::Apply(ExactFunction::Sign, Box::new(symbol(PlaceQuantity::Rate)));
             let on_drive = self.stream.chance(0.6);
             let choices = [
                 ("viscous_friction", symbol(PlaceQuantity::Rate)),
@@ -427,8 +404,7 @@ impl Draft {
                 ("force_offset", number(1)),
                 if on_drive {
                     // A coordinate carries no load of its own.
-                    let friction =
-                        ExactExpression::Product(vec![symbol(PlaceQuantity::Load), sign]);
+                    let friction = ExactExpression::Product(vec![symbol(PlaceQuantity::Load), sign]);
                     ("load_friction", friction)
                 } else {
                     ("spring", symbol(PlaceQuantity::Coordinate))
@@ -454,13 +430,7 @@ impl Draft {
         }
     }
 
-    fn effect(
-        &mut self,
-        kind: &str,
-        places: Vec<EffectPlace>,
-        parameter: ParameterIdx,
-        expression: ExactExpression,
-    ) {
+    fn effect(&mut self, kind: &str, places: Vec<EffectPlace>, parameter: ParameterIdx, expression: ExactExpression) {
         self.mechanism.effects.push(ModelEffect {
             kind: kind.to_owned(),
             places,

@@ -1,8 +1,8 @@
 //! Random planar mechanisms of one loop.
 
 use modelmill_spec::{
-    CoordinateIdx, CoordinateMotion, ExactAngle, ExactExpression, FrameAxis, FrameIdx, FrameStep,
-    KinematicLoop, Mechanism, ModelSymbol, PointIdx,
+    CoordinateIdx, CoordinateMotion, ExactAngle, ExactExpression, FrameAxis, FrameIdx, FrameStep, KinematicLoop,
+    Mechanism, ModelSymbol, PointIdx,
 };
 
 use super::{Draft, Matter, ZERO, number, ratio, shift, slide};
@@ -32,15 +32,9 @@ fn draw(seed: u64, matter: Matter) -> Option<Mechanism> {
     let mut joints = Vec::new();
     let left = draft.chain(FrameIdx(0), n_left, &mut joints);
     // The right chain hangs on a base frame whose place follows when all else is known.
-    let (x, y) = (
-        draft.constant("bx", 0.0, "m"),
-        draft.constant("by", 0.0, "m"),
-    );
+    let (x, y) = (draft.constant("bx", 0.0, "m"), draft.constant("by", 0.0, "m"));
     let symbol = |i| ExactExpression::Symbol(ModelSymbol::Constant(i));
-    let base_steps = vec![
-        shift(FrameAxis::X, symbol(x)),
-        shift(FrameAxis::Y, symbol(y)),
-    ];
+    let base_steps = vec![shift(FrameAxis::X, symbol(x)), shift(FrameAxis::Y, symbol(y))];
     let base = draft.frame(FrameIdx(0), base_steps);
     let right = draft.chain(base, n - n_left, &mut joints);
     draft.mechanism.loops.push(KinematicLoop {
@@ -116,12 +110,7 @@ pub fn regularity_at(mechanism: &Mechanism, coordinates: &[f64]) -> f64 {
 
 impl Draft {
     /// A chain of `n` joints on `base`; returns its tip.
-    fn chain(
-        &mut self,
-        base: FrameIdx,
-        n: usize,
-        joints: &mut Vec<(CoordinateIdx, FrameIdx)>,
-    ) -> PointIdx {
+    fn chain(&mut self, base: FrameIdx, n: usize, joints: &mut Vec<(CoordinateIdx, FrameIdx)>) -> PointIdx {
         let mut frame = base;
         for i in 0..n {
             let motion = if self.stream.chance(0.75) {
@@ -130,11 +119,7 @@ impl Draft {
                 CoordinateMotion::Prismatic
             };
             let coordinate = self.coordinate(motion);
-            let offset = if i == 0 {
-                ZERO()
-            } else {
-                self.length(0.3, 0.9)
-            };
+            let offset = if i == 0 { ZERO() } else { self.length(0.3, 0.9) };
             let mut steps = vec![shift(FrameAxis::X, offset)];
             if motion.is_angle() {
                 steps.push(FrameStep::Rotate(

@@ -1,8 +1,7 @@
 //! Random spatial trees of revolute and prismatic joints.
 
 use modelmill_spec::{
-    CoordinateIdx, CoordinateMotion, ExactAngle, FrameAxis, FrameIdx, FrameStep, Mechanism,
-    ModelSymbol,
+    CoordinateIdx, CoordinateMotion, ExactAngle, FrameAxis, FrameIdx, FrameStep, Mechanism, ModelSymbol,
 };
 
 use super::{Draft, Matter, ZERO, ratio, shift, slide, small};
@@ -92,11 +91,7 @@ impl Draft {
         let [a, d] = offsets;
         let general = self.stream.chance(0.3);
         let mut axis = |fixed: FrameAxis| {
-            if general {
-                *self.stream.pick(&AXES)
-            } else {
-                fixed
-            }
+            if general { *self.stream.pick(&AXES) } else { fixed }
         };
         let (about, along, joint, last) = (
             axis(FrameAxis::X),

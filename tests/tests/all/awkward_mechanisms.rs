@@ -3,9 +3,7 @@
 use std::fmt::Write;
 
 use modelmill_boundary::files::MemoryFiles;
-use modelmill_codegen::{
-    DeriveError, ModelEvaluator, MotionStates, PassivePosition, ReductionMethod,
-};
+use modelmill_codegen::{DeriveError, ModelEvaluator, MotionStates, PassivePosition, ReductionMethod};
 use modelmill_spec::{DriveKind, FrameIdx, Mechanism, PointIdx};
 use modelmill_tests::fixtures::{derive, fixtures, model};
 use modelmill_tests::laws::Case;
@@ -183,10 +181,7 @@ fn large_multiples_and_many_roots_come_to_an_end() {
         derive(&model("two_link")).reduction.retained.len() + 1
     );
     let roots = derive(&awkward("many_roots"));
-    assert!(matches!(
-        roots.reduction.method,
-        ReductionMethod::Numeric { .. }
-    ));
+    assert!(matches!(roots.reduction.method, ReductionMethod::Numeric { .. }));
 }
 
 /// Four-bars beside each other, each with a crank of its own, or in a row, each cranked by the rocker of the one before.
@@ -262,8 +257,7 @@ fn four_bars(n: usize, in_a_row: bool) -> Mechanism {
 fn assembled(a: f64, b: f64, c: f64, d: f64, crank: f64) -> (f64, f64) {
     let (x, y) = (d - a * crank.cos(), -a * crank.sin());
     let diagonal = x.hypot(y);
-    let coupler =
-        y.atan2(x) + ((b * b + diagonal * diagonal - c * c) / (2.0 * b * diagonal)).acos();
+    let coupler = y.atan2(x) + ((b * b + diagonal * diagonal - c * c) / (2.0 * b * diagonal)).acos();
     let (ex, ey) = (
         a * crank.cos() + b * coupler.cos() - d,
         a * crank.sin() + b * coupler.sin(),
@@ -324,10 +318,7 @@ fn a_power_of_a_sum_of_parameters_is_refused_before_it_fills_the_memory() {
     let error = modelmill_codegen::derive(&loaded.mechanism)
         .err()
         .expect("no derivation");
-    assert!(
-        error.to_string().contains("more than 2000 products"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("more than 2000 products"), "{error}");
 }
 
 #[test]
@@ -346,11 +337,6 @@ fn a_drive_that_nothing_moves_is_refused() {
         from: PointIdx(mechanism.points.len() - 1),
         to: PointIdx(ends[1]),
     };
-    let error = modelmill_codegen::derive(&mechanism)
-        .err()
-        .expect("no derivation");
-    assert!(
-        error.to_string().contains("that every drive moves"),
-        "{error}"
-    );
+    let error = modelmill_codegen::derive(&mechanism).err().expect("no derivation");
+    assert!(error.to_string().contains("that every drive moves"), "{error}");
 }

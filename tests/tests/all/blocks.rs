@@ -6,10 +6,7 @@ use modelmill_tests::sample::Sample;
 use modelmill_tests::stream::Stream;
 
 /// All rows that are shown, and how it ended.
-fn shown(
-    evaluator: &ModelEvaluator<'_>,
-    sample: &Sample,
-) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
+fn shown(evaluator: &ModelEvaluator<'_>, sample: &Sample) -> (Vec<Vec<f64>>, Result<(), PoseFault>) {
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let end = evaluator.regressor_blocks::<PoseFault>(&sample.states(), |len, block| {
         columns.resize(block.len(), Vec::new());
@@ -58,21 +55,17 @@ fn some_columns_are_what_they_are_among_all() {
         for wanted in [vec![0], vec![n - 1], (0..n).step_by(3).collect()] {
             let mut before = 0;
             let is_wanted = |k: usize| wanted.contains(&k);
-            let end = evaluator.regressor_column_blocks::<PoseFault>(
-                &sample.states(),
-                &is_wanted,
-                |len, block| {
-                    for (k, values) in block.iter().enumerate() {
-                        for (i, value) in values.iter().enumerate() {
-                            let entry = matrix[((before + i) * drives + k / n, k % n)];
-                            let expected = if is_wanted(k % n) { entry } else { 0.0 };
-                            assert_eq!(value.to_bits(), expected.to_bits(), "{name} {wanted:?}");
-                        }
+            let end = evaluator.regressor_column_blocks::<PoseFault>(&sample.states(), &is_wanted, |len, block| {
+                for (k, values) in block.iter().enumerate() {
+                    for (i, value) in values.iter().enumerate() {
+                        let entry = matrix[((before + i) * drives + k / n, k % n)];
+                        let expected = if is_wanted(k % n) { entry } else { 0.0 };
+                        assert_eq!(value.to_bits(), expected.to_bits(), "{name} {wanted:?}");
                     }
-                    before += len;
-                    Ok(())
-                },
-            );
+                }
+                before += len;
+                Ok(())
+            });
             assert_eq!((end, before), (Ok(()), 70));
         }
     }

@@ -26,10 +26,7 @@ fn check(name: &str) {
 #[track_caller]
 fn check_forces(name: &str, case: &Case) {
     let method = &case.derivation.reduction.method;
-    assert!(
-        matches!(method, ReductionMethod::Exact { .. }),
-        "{name}: {method:?}"
-    );
+    assert!(matches!(method, ReductionMethod::Exact { .. }), "{name}: {method:?}");
     for law in [
         case.reduction_keeps_the_forces(),
         case.forces_satisfy_dalembert(40),

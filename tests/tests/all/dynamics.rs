@@ -31,20 +31,12 @@ fn check(matter: Matter, n: u64, law: impl Fn(&Case) -> Result<f64, String>) {
 
 #[test]
 fn terms_add_up_to_the_inverse_dynamics_of_anything() {
-    check(
-        Matter::Anything,
-        60,
-        Case::equation_of_motion_is_the_inverse_dynamics,
-    );
+    check(Matter::Anything, 60, Case::equation_of_motion_is_the_inverse_dynamics);
 }
 
 #[test]
 fn terms_add_up_to_the_inverse_dynamics_of_bodies() {
-    check(
-        Matter::Physical,
-        40,
-        Case::equation_of_motion_is_the_inverse_dynamics,
-    );
+    check(Matter::Physical, 40, Case::equation_of_motion_is_the_inverse_dynamics);
 }
 
 #[test]
@@ -237,17 +229,10 @@ fn condition(derivation: &Derivation, one: &Sample) -> f64 {
     (values.max() + rest) / values.min().max(1e-300)
 }
 
-fn compare(
-    derivation: &Derivation,
-    one: &Sample,
-    mass: &[f64],
-    rest: &[Vec<f64>; 3],
-    bias: &[f64],
-) {
+fn compare(derivation: &Derivation, one: &Sample, mass: &[f64], rest: &[Vec<f64>; 3], bias: &[f64]) {
     let dynamics = derivation.dynamics().expect("affine in the accelerations");
     let p_min = base(derivation, &nominal(&derivation.mechanism));
-    let expected =
-        terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
+    let expected = terms(&ModelEvaluator::new(derivation), &dynamics, one, &p_min).expect("a state");
     let close = |what: &str, a: &[f64], b: &[f64]| {
         let scale = largest(a);
         for (x, y) in a.iter().zip(b) {
@@ -256,22 +241,13 @@ fn compare(
     };
     close("mass matrix", expected.mass.transpose().as_slice(), mass);
     let parts = [&expected.coriolis, &expected.gravity, &expected.effects];
-    for ((what, a), b) in ["coriolis", "gravity", "effects"]
-        .iter()
-        .zip(parts)
-        .zip(rest)
-    {
+    for ((what, a), b) in ["coriolis", "gravity", "effects"].iter().zip(parts).zip(rest) {
         close(what, a.as_slice(), b);
     }
-    let sum: Vec<f64> = (0..bias.len())
-        .map(|a| rest.iter().map(|r| r[a]).sum())
-        .collect();
+    let sum: Vec<f64> = (0..bias.len()).map(|a| rest.iter().map(|r| r[a]).sum()).collect();
     let scale = rest.iter().map(|r| largest(r)).sum::<f64>();
     for (x, y) in bias.iter().zip(&sum) {
-        assert!(
-            (x - y).abs() <= 1e-11 * scale,
-            "bias: {bias:?} beside {sum:?}"
-        );
+        assert!((x - y).abs() <= 1e-11 * scale, "bias: {bias:?} beside {sum:?}");
     }
 }
 

@@ -11,17 +11,14 @@ type Source = (String, String);
 #[test]
 fn no_folder_uses_one_that_stands_after_it() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let text =
-        fs::read_to_string(root.join("docs/dev/order-of-folders.md")).expect("the page is there");
+    let text = fs::read_to_string(root.join("docs/dev/order-of-folders.md")).expect("the page is there");
     let orders = orders(&text);
     assert!(orders.len() > 1, "the table of order-of-folders.md is read");
     let faults: Vec<String> = orders
         .iter()
         .flat_map(|(folder, order)| {
             let faults = faults(order, &sources(&root.join(folder)));
-            faults
-                .into_iter()
-                .map(move |fault| format!("{folder}: {fault}"))
+            faults.into_iter().map(move |fault| format!("{folder}: {fault}"))
         })
         .collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
@@ -29,10 +26,7 @@ fn no_folder_uses_one_that_stands_after_it() {
 
 /// The table: for every folder of sources, its parts in the order in which they may use each other.
 fn orders(page: &str) -> BTreeMap<String, Vec<String>> {
-    let section = page
-        .split("# The order of folders\n")
-        .nth(1)
-        .unwrap_or_default();
+    let section = page.split("# The order of folders\n").nth(1).unwrap_or_default();
     let section = section.split("\n#").next().unwrap_or_default();
     let in_ticks = |cell: &str| -> Vec<String> {
         let words = cell.split('`').skip(1).step_by(2);
@@ -107,15 +101,11 @@ fn faults(order: &[String], sources: &[Source]) -> Vec<String> {
             };
             match (place(from), place(to)) {
                 (Some(a), Some(b)) if b > a => {
-                    faults.push(format!(
-                        "{path} uses `{name}` of `{to}`, which stands after `{from}`"
-                    ));
+                    faults.push(format!("{path} uses `{name}` of `{to}`, which stands after `{from}`"));
                 }
                 // What another crate owns may come through the root; what the root itself defines may not be used below.
                 (_, None) if !exports.contains_key(&name) => {
-                    faults.push(format!(
-                        "{path} uses `{name}`, which the root of the crate defines"
-                    ));
+                    faults.push(format!("{path} uses `{name}`, which the root of the crate defines"));
                 }
                 _ => {}
             }
@@ -171,10 +161,7 @@ fn for_tests(sources: &[Source]) -> Vec<String> {
         };
         let lines: Vec<&str> = text.lines().collect();
         for pair in lines.windows(2).filter(|pair| pair[0] == "#[cfg(test)]") {
-            let name = pair[1]
-                .rsplit("mod ")
-                .next()
-                .and_then(|n| n.strip_suffix(';'));
+            let name = pair[1].rsplit("mod ").next().and_then(|n| n.strip_suffix(';'));
             found.extend(name.map(|name| format!("{folder}{name}")));
         }
     }
@@ -185,10 +172,7 @@ fn for_tests(sources: &[Source]) -> Vec<String> {
 fn exports(root: &[String]) -> BTreeMap<String, String> {
     let mut exports = BTreeMap::new();
     for (i, _) in root.iter().enumerate().filter(|(_, t)| *t == "use") {
-        let end = root[i..]
-            .iter()
-            .position(|t| t == ";")
-            .map_or(root.len(), |n| i + n);
+        let end = root[i..].iter().position(|t| t == ";").map_or(root.len(), |n| i + n);
         let path = &root[i + 1..end];
         for (k, token) in path.iter().enumerate() {
             let next = path.get(k + 1).map(String::as_str);
@@ -284,10 +268,7 @@ fn a_made_reference_that_runs_back_is_found() {
         assert_eq!(told("middle/inner.rs", back).len(), 1, "{back}");
         assert_eq!(told("base/inner.rs", back).len(), 1, "{back}");
     }
-    assert_eq!(
-        told("middle/inner.rs", "fn f() { crate::of_root(); }\n").len(),
-        1
-    );
+    assert_eq!(told("middle/inner.rs", "fn f() { crate::of_root(); }\n").len(), 1);
     assert_eq!(told("stray/mod.rs", "").len(), 1);
     let silent = "// use crate::top::Roof;\nuse super::tests;\n#[cfg(test)]\nmod tests {\n    use crate::top;\n}\n";
     assert_eq!(told("base/inner.rs", silent), nothing);

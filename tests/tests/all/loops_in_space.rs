@@ -17,10 +17,7 @@ fn check(name: &str, reach: f64) {
         reduction.method
     );
     assert!(
-        matches!(
-            case.derivation.programs.passive_position,
-            PassivePosition::Closed
-        ),
+        matches!(case.derivation.programs.passive_position, PassivePosition::Closed),
         "{name} has no closed form"
     );
     laws(&case);
@@ -72,8 +69,7 @@ fn rods_as_two_masses_leave_three_parameters_of_a_delta() {
 #[test]
 fn a_pair_of_thin_rods_is_one_of_twice_the_mass_that_turns_with_its_spacing_in_the_constants() {
     // Each rod of a pair moves as the other, so that the pair has no more base parameters than one thin rod.
-    let [pair, one] =
-        ["delta-pairs", "delta-thin_rods"].map(|n| derived(n).reduction.retained.len());
+    let [pair, one] = ["delta-pairs", "delta-thin_rods"].map(|n| derived(n).reduction.retained.len());
     assert_eq!(pair, one);
 }
 
@@ -123,10 +119,7 @@ fn drives_may_be_independent_instead_of_the_platform() {
     ] {
         let case = Case::near_nominal(&model(name), 160, 0.05).unwrap();
         let reduction = &case.derivation.reduction;
-        assert!(
-            matches!(reduction.method, ReductionMethod::Exact { .. }),
-            "{name}"
-        );
+        assert!(matches!(reduction.method, ReductionMethod::Exact { .. }), "{name}");
         laws(&case);
         // Which coordinates are independent changes neither the products nor their dependences.
         let other = derived(same);
@@ -142,10 +135,7 @@ fn platforms_of_three_freedoms() {
     for name in ["three_rrs", "three_prs"] {
         let case = Case::near_nominal(&model(name), 160, 0.1).unwrap();
         let method = &case.derivation.reduction.method;
-        assert!(
-            matches!(method, ReductionMethod::Exact { .. }),
-            "{name}: {method:?}"
-        );
+        assert!(matches!(method, ReductionMethod::Exact { .. }), "{name}: {method:?}");
         for error in [case.forces_satisfy_dalembert(10), case.loops_stay_closed()] {
             assert!(error.unwrap() < 100.0 * ACCURACY);
         }
@@ -158,9 +148,6 @@ fn platforms_of_three_freedoms() {
 fn equations_that_follow_from_others_are_left_out() {
     let case = Case::near_nominal(&model("spherical_wrist"), 160, 0.2).unwrap();
     let method = &case.derivation.reduction.method;
-    assert!(
-        matches!(method, ReductionMethod::Exact { .. }),
-        "{method:?}"
-    );
+    assert!(matches!(method, ReductionMethod::Exact { .. }), "{method:?}");
     laws(&case);
 }

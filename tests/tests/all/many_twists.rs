@@ -32,11 +32,7 @@ fn twisted(n: usize) -> Mechanism {
         };
         writeln!(text, "[[frame]]\nname = \"l{i}\"\non = \"{on}\"").unwrap();
         writeln!(text, "modified_dh = {{ {own}theta = \"q{i}\" }}").unwrap();
-        writeln!(
-            text,
-            "[[part]]\non = \"l{i}\"\nlinear = {{ all = \"_{i}\" }}"
-        )
-        .unwrap();
+        writeln!(text, "[[part]]\non = \"l{i}\"\nlinear = {{ all = \"_{i}\" }}").unwrap();
         writeln!(text, "[[drive]]\nname = \"t{i}\"\njoint = \"q{i}\"").unwrap();
         on = format!("l{i}");
     }
@@ -64,10 +60,7 @@ fn check(n: usize) {
     );
     assert_eq!(reduction.retained.len(), 7 * n - 6, "{n}");
     case.exact_rank_is_numeric_rank().unwrap();
-    for error in [
-        case.reduction_keeps_the_forces(),
-        case.forces_satisfy_dalembert(5),
-    ] {
+    for error in [case.reduction_keeps_the_forces(), case.forces_satisfy_dalembert(5)] {
         let error = error.unwrap();
         assert!(error < 100.0 * ACCURACY, "{n}: {error:.1e}");
     }

@@ -12,10 +12,10 @@ const CONVENTIONAL: [&str; 6] = ["Error", "Options", "Builder", "Iter", "Result"
 
 /// Words that say nothing alone: a reader has to know of what, by what or from what.
 const BARE: [&str; 45] = [
-    "told", "untold", "said", "says", "tell", "tells", "found", "made", "left", "asked", "given",
-    "taken", "kept", "felt", "seen", "tried", "moved", "carried", "judged", "named", "drawn",
-    "held", "written", "going", "now", "one", "of", "by", "at", "on", "in", "with", "as", "beside",
-    "besides", "between", "apart", "alike", "whole", "what", "who", "where", "how", "so", "than",
+    "told", "untold", "said", "says", "tell", "tells", "found", "made", "left", "asked", "given", "taken", "kept",
+    "felt", "seen", "tried", "moved", "carried", "judged", "named", "drawn", "held", "written", "going", "now", "one",
+    "of", "by", "at", "on", "in", "with", "as", "beside", "besides", "between", "apart", "alike", "whole", "what",
+    "who", "where", "how", "so", "than",
 ];
 
 /// Folders whose names are not looked at.
@@ -67,35 +67,22 @@ fn all_definitions() -> [Vec<Definition>; 2] {
     while let Some(folder) = open.pop() {
         for entry in fs::read_dir(&folder).expect("a folder of the project") {
             let path = entry.expect("an entry of a folder").path();
-            let name = path
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .to_string();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().to_string();
             if path.is_dir() {
                 if !SKIPPED.contains(&name.as_str()) && !name.starts_with('.') {
                     open.push(path);
                 }
-            } else if path.extension().is_some_and(|e| e == "rs")
-                && name != "tests.rs"
-                && !name.ends_with("_tests.rs")
+            } else if path.extension().is_some_and(|e| e == "rs") && name != "tests.rs" && !name.ends_with("_tests.rs")
             {
                 let text = fs::read_to_string(&path).expect("a source file");
-                let file = path
-                    .strip_prefix(&root)
-                    .unwrap_or(&path)
-                    .display()
-                    .to_string();
+                let file = path.strip_prefix(&root).unwrap_or(&path).display().to_string();
                 for (kind, defined) in definitions(&text, &file).into_iter().enumerate() {
                     all[kind].extend(defined);
                 }
             }
         }
     }
-    assert!(
-        all[0].len() > 1000 && all[1].len() > 5000,
-        "the sources are read"
-    );
+    assert!(all[0].len() > 1000 && all[1].len() > 5000, "the sources are read");
     all
 }
 

@@ -19,26 +19,16 @@ fn count(program: &StraightLineProgram) -> OperationCount {
 fn check(name: &str, inverse_dynamics: usize, regressor: usize) {
     let programs = derived(name).programs;
     for (what, program, reached) in [
-        (
-            "inverse dynamics",
-            &programs.inverse_dynamics,
-            inverse_dynamics,
-        ),
+        ("inverse dynamics", &programs.inverse_dynamics, inverse_dynamics),
         ("regressor", &programs.regressor, regressor),
     ] {
         let found = count(program);
-        println!(
-            "{name}, {what}: {} + {} beside {reached}",
-            found.add, found.mul
-        );
+        println!("{name}, {what}: {} + {} beside {reached}", found.add, found.mul);
         assert!(
             found.add + found.mul <= reached,
             "{name}, {what}: {found:?}, reached before {reached}"
         );
-        assert_eq!(
-            found.div, 0,
-            "{name}, {what}: an open chain divides by nothing"
-        );
+        assert_eq!(found.div, 0, "{name}, {what}: an open chain divides by nothing");
     }
 }
 
@@ -78,21 +68,14 @@ fn check_values(name: &str) {
     let derivation = derived(name);
     let mechanism = &derivation.mechanism;
     let evaluator = ModelEvaluator::new(&derivation);
-    let reach = if mechanism.loops.is_empty() {
-        3.0
-    } else {
-        0.25
-    };
+    let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.25 };
     let mut stream = Stream::new(99);
     let sample = Sample::random(mechanism, 100, reach, &mut stream).reachable(&evaluator);
     assert!(sample.len() > 50, "{name}: too few states");
     let parameters: Vec<f64> = (0..mechanism.parameters.len())
         .map(|_| stream.between(-1.0, 1.0))
         .collect();
-    let (p_g, p_min) = (
-        products(&derivation, &parameters),
-        base(&derivation, &parameters),
-    );
+    let (p_g, p_min) = (products(&derivation, &parameters), base(&derivation, &parameters));
     let states = sample.states();
     let reachable = "the states are reachable";
     let plain = evaluator.full_regressor(&states).expect(reachable);
@@ -102,17 +85,10 @@ fn check_values(name: &str) {
         let error = (a - b).amax() / a.amax().max(1e-9);
         assert!(error < 1e-12, "{name}, column {k}: error {error:.1e}");
     }
-    let forces = evaluator
-        .inverse_dynamics(&states, &p_min)
-        .expect(reachable);
+    let forces = evaluator.inverse_dynamics(&states, &p_min).expect(reachable);
     let n_drives = mechanism.drives.len();
     for row in 0..plain.nrows() {
-        let terms: Vec<f64> = plain
-            .row(row)
-            .iter()
-            .zip(&p_g)
-            .map(|(a, b)| a * b)
-            .collect();
+        let terms: Vec<f64> = plain.row(row).iter().zip(&p_g).map(|(a, b)| a * b).collect();
         let scale = terms.iter().map(|t| t.abs()).sum::<f64>().max(1e-9);
         let error = (forces[row % n_drives][row / n_drives] - terms.iter().sum::<f64>()).abs();
         assert!(

@@ -119,19 +119,13 @@ fn no_published_crate_takes_a_file_from_outside_its_folder() {
 fn crates_that_are_not_published_have_no_version_to_depend_on() {
     let manifest = text(&root().join("Cargo.toml"));
     for (folder, own) in members() {
-        let name = own
-            .split("name = \"")
-            .nth(1)
-            .and_then(|rest| rest.split('"').next());
+        let name = own.split("name = \"").nth(1).and_then(|rest| rest.split('"').next());
         let name = name.expect("a name");
         let line = format!("\n{name} = {{ path");
         let Some(rest) = manifest.split(&line).nth(1) else {
             continue;
         };
-        let has_version = rest
-            .lines()
-            .next()
-            .is_some_and(|line| line.contains("version"));
+        let has_version = rest.lines().next().is_some_and(|line| line.contains("version"));
         let is_published = !own.contains("\npublish = false\n");
         assert_eq!(has_version, is_published, "{}", folder.display());
     }
@@ -169,9 +163,7 @@ fn link_targets(prose: &str) -> Vec<&str> {
     let rest = prose.split("](").skip(1);
     let targets = rest.filter_map(|rest| rest.split_once(')'));
     let files = targets.map(|(target, _)| target.split('#').next().unwrap_or_default());
-    files
-        .filter(|file| !file.is_empty() && !file.contains("://"))
-        .collect()
+    files.filter(|file| !file.is_empty() && !file.contains("://")).collect()
 }
 
 #[test]

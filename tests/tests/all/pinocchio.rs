@@ -16,23 +16,14 @@ fn check(name: &str) {
     let mechanism = &derivation.mechanism;
     let table = Table::reference(&format!("pinocchio-{name}"));
     let values = Table::reference(&format!("pinocchio-{name}-parameters"));
-    let parameters: Vec<f64> = mechanism
-        .parameters
-        .iter()
-        .map(|p| values.column(&p.name)[0])
-        .collect();
+    let parameters: Vec<f64> = mechanism.parameters.iter().map(|p| values.column(&p.name)[0]).collect();
     assert_eq!(parameters.len(), values.names().len());
     let sample = Sample::from_table(mechanism, &table);
     let evaluator = ModelEvaluator::new(&derivation);
-    let h = evaluator
-        .full_regressor(&sample.states())
-        .expect("an open chain");
+    let h = evaluator.full_regressor(&sample.states()).expect("an open chain");
     let by_products = h * DVector::from_vec(base_parameters::products(&derivation, &parameters));
     let by_base = evaluator
-        .inverse_dynamics(
-            &sample.states(),
-            &base_parameters::base(&derivation, &parameters),
-        )
+        .inverse_dynamics(&sample.states(), &base_parameters::base(&derivation, &parameters))
         .expect("an open chain");
     let n_drives = mechanism.drives.len();
     for (d, drive) in mechanism.drives.iter().enumerate() {

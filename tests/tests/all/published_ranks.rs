@@ -16,8 +16,7 @@ fn check(name: &str, published: usize) {
     let products = derivation.reduction.products.len();
     let reach = if mechanism.loops.is_empty() { 3.0 } else { 0.3 };
     let n = 60 + 4 * products / mechanism.drives.len();
-    let sample = Sample::random(&mechanism, n, reach, &mut Stream::new(published as u64))
-        .reachable(&evaluator);
+    let sample = Sample::random(&mechanism, n, reach, &mut Stream::new(published as u64)).reachable(&evaluator);
     assert!(
         sample.len() * mechanism.drives.len() > 2 * products,
         "{name}: too few states"

@@ -79,22 +79,13 @@ fn planar_loops_determine_what_lies_in_their_plane() {
         ("three_rrr", 7, 2),
     ] {
         let [told, left_out] = check_model(name, 0.2);
-        assert_eq!(
-            [told, left_out],
-            [3 * joints + 2 * loops, 3 * joints + loops],
-            "{name}"
-        );
+        assert_eq!([told, left_out], [3 * joints + 2 * loops, 3 * joints + loops], "{name}");
     }
 }
 
 #[test]
 fn linkages_and_slides() {
-    for name in [
-        "three_rpr",
-        "slider_crank",
-        "arm_parallelogram",
-        "arm_four_bar",
-    ] {
+    for name in ["three_rpr", "slider_crank", "arm_parallelogram", "arm_four_bar"] {
         let [told, left_out] = check_model(name, 0.2);
         assert!(told > 0 && left_out > 0, "{name}");
     }
@@ -138,15 +129,9 @@ fn a_bearing_by_hand() {
         load: Vec::new(),
     };
     let values = evaluator.reactions(&reactions, &at_rest).unwrap();
-    let numbers = modelmill_tests::mechanics::Numbers::new(
-        mechanism,
-        modelmill_tests::base_parameters::nominal(mechanism),
-    );
-    let mass: f64 = numbers
-        .bodies()
-        .iter()
-        .map(|(_, inertia)| inertia[(3, 3)])
-        .sum();
+    let numbers =
+        modelmill_tests::mechanics::Numbers::new(mechanism, modelmill_tests::base_parameters::nominal(mechanism));
+    let mass: f64 = numbers.bodies().iter().map(|(_, inertia)| inertia[(3, 3)]).sum();
     let weight = numbers.gravity() * -mass;
     for k in 0..3 {
         let place = reactions.joints[0].force[k].unwrap();

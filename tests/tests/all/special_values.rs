@@ -27,10 +27,7 @@ fn ranks(mechanism: &Mechanism) -> (usize, usize) {
 
 /// Base parameters for the file's values alone.
 fn rank_at_values(mechanism: &Mechanism) -> usize {
-    derive(&mechanism.with_numeric_constants())
-        .reduction
-        .retained
-        .len()
+    derive(&mechanism.with_numeric_constants()).reduction.retained.len()
 }
 
 #[test]

@@ -159,9 +159,7 @@ impl TourFolder {
         self.write(EDITED, &edited.text)?;
         let model = &findings.before.model;
         let commands = findings.entries.iter();
-        let commands = commands
-            .map(|entry| flags.spell_effect(model, entry))
-            .collect();
+        let commands = commands.map(|entry| flags.spell_effect(model, entry)).collect();
         // File names of the difference, as `diff` prints them.
         let names = ["spidermill.toml", EDITED];
         let difference = edit::difference(model.text(), &edited.text, names);
@@ -190,9 +188,10 @@ struct TourComparison {
 impl TourComparison {
     /// Computes forces and errors along the first segment. Fails if the recording has no samples.
     fn new(model: &Model, recording: &PreparedRecording) -> CommandOutcome<Self> {
-        let one = recording.segments.first().ok_or_else(|| {
-            CommandFailure::Input("the bundled recording has no samples".to_owned())
-        })?;
+        let one = recording
+            .segments
+            .first()
+            .ok_or_else(|| CommandFailure::Input("the bundled recording has no samples".to_owned()))?;
         let measured = along::measured_forces(one)?;
         // Samples of forces and measurements must agree, so both are decimated alike.
         let forces = along::filter_and_decimate(along::forces(model, one, &model.nominal)?, one)?;
@@ -212,9 +211,5 @@ impl TourComparison {
 
 /// The verdict of a diagnosis in words.
 fn verdict(findings: &DiagnosisFindings) -> String {
-    words::verdict(
-        &findings.diagnosis,
-        findings.channels(),
-        findings.validation,
-    )
+    words::verdict(&findings.diagnosis, findings.channels(), findings.validation)
 }

@@ -140,10 +140,7 @@ impl TourText {
         self.paragraph(&verdict(findings));
         // Effects that were found come first, then the best of the rejected ones.
         let shown = all.iter().filter(|c| c.rejection_reason.is_none());
-        let others = all
-            .iter()
-            .filter(|c| c.rejection_reason.is_some())
-            .take(OTHERS);
+        let others = all.iter().filter(|c| c.rejection_reason.is_some()).take(OTHERS);
         let has_effects = !findings.diagnosis.effects.is_empty();
         let rows: Vec<Vec<String>> = shown
             .chain(others)
@@ -265,9 +262,7 @@ impl TourText {
             }
         }
         self.line("");
-        self.paragraph(
-            "Error relative to the force (nrms) on the validation run; logarithmic bars.",
-        );
+        self.paragraph("Error relative to the force (nrms) on the validation run; logarithmic bars.");
     }
 
     /// The diagnosis of the model as published.

@@ -38,9 +38,7 @@ pub(crate) fn solve(
     let n_rhs = rhs.first().map_or(0, Vec::len);
     let mut values = vec![vec![Graph::ZERO; n_rhs]; n];
     let mut determinants = Vec::new();
-    let singular = || DeriveError::Singular {
-        what: what.to_owned(),
-    };
+    let singular = || DeriveError::Singular { what: what.to_owned() };
     let mut rhs = rhs.to_vec();
     // Unknowns of all blocks so far.
     let mut solved: Vec<usize> = Vec::new();
@@ -64,33 +62,28 @@ pub(crate) fn solve(
             .map(|r| columns.iter().map(|c| matrix[*r][*c]).collect())
             .collect();
         let block_rhs: Vec<Vec<ExprId>> = rows.iter().map(|r| rhs[*r].clone()).collect();
-        let found =
-            if rows.len() > LARGEST_BLOCK {
-                let (found, regular) = torn::solve_by_tearing(graph, &block, &block_rhs)
-                    .ok_or_else(|| DeriveError::TooLarge {
-                        what: what.to_owned(),
-                        size: rows.len(),
-                        limit: LARGEST_BLOCK,
-                    })?;
-                // Indices above 1 are expressions; the number 1 cannot vanish.
-                determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
-                found
-            } else {
-                let (found, determinant) =
-                    solve_by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
-                if determinant.index() > 1 {
-                    determinants.push(determinant);
-                }
-                found
-            };
+        let found = if rows.len() > LARGEST_BLOCK {
+            let (found, regular) =
+                torn::solve_by_tearing(graph, &block, &block_rhs).ok_or_else(|| DeriveError::TooLarge {
+                    what: what.to_owned(),
+                    size: rows.len(),
+                    limit: LARGEST_BLOCK,
+                })?;
+            // Indices above 1 are expressions; the number 1 cannot vanish.
+            determinants.extend(regular.into_iter().filter(|d| d.index() > 1));
+            found
+        } else {
+            let (found, determinant) = solve_by_cofactors(graph, &block, &block_rhs).ok_or_else(singular)?;
+            if determinant.index() > 1 {
+                determinants.push(determinant);
+            }
+            found
+        };
         for (column, value) in columns.iter().zip(found) {
             values[*column] = value;
         }
     }
-    Ok(LinearSolution {
-        values,
-        determinants,
-    })
+    Ok(LinearSolution { values, determinants })
 }
 
 /// Rows with the columns that they determine, such that a block needs only the columns of blocks before it

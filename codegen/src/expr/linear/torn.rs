@@ -39,16 +39,8 @@ pub(crate) fn solve_by_tearing(
                     .collect();
                 graph.add_all(&terms)
             };
-            small.push(
-                torn.iter()
-                    .map(|c| combine(graph, matrix, *c))
-                    .collect::<Vec<_>>(),
-            );
-            small_rhs.push(
-                (0..n_rhs)
-                    .map(|k| combine(graph, rhs, k))
-                    .collect::<Vec<_>>(),
-            );
+            small.push(torn.iter().map(|c| combine(graph, matrix, *c)).collect::<Vec<_>>());
+            small_rhs.push((0..n_rhs).map(|k| combine(graph, rhs, k)).collect::<Vec<_>>());
         }
     }
     // Its solution gives the torn unknowns.
@@ -121,19 +113,15 @@ fn tear(matrix: &[Vec<ExprId>]) -> Option<(Vec<usize>, Vec<ConnectedBlock>)> {
 fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedBlock> {
     let mut parts: Vec<ConnectedBlock> = Vec::new();
     for (row, entries) in matrix.iter().enumerate() {
-        let own: Vec<usize> = columns
-            .iter()
-            .copied()
-            .filter(|c| entries[*c] != Graph::ZERO)
-            .collect();
+        let own: Vec<usize> = columns.iter().copied().filter(|c| entries[*c] != Graph::ZERO).collect();
         let mut joined = ConnectedBlock {
             rows: vec![row],
             columns: own,
         };
         // Parts that share a column with this row become one part with it.
-        let (touching, others) = parts.into_iter().partition(|part: &ConnectedBlock| {
-            part.columns.iter().any(|c| joined.columns.contains(c))
-        });
+        let (touching, others) = parts
+            .into_iter()
+            .partition(|part: &ConnectedBlock| part.columns.iter().any(|c| joined.columns.contains(c)));
         parts = others;
         for part in touching {
             let part: ConnectedBlock = part;
@@ -149,18 +137,10 @@ fn connected_blocks(matrix: &[Vec<ExprId>], columns: &[usize]) -> Vec<ConnectedB
 }
 
 /// Combinations of a part's rows, as pairs of a row and its factor, in which the part's own columns cancel.
-fn cancelling_rows(
-    graph: &mut Graph,
-    matrix: &[Vec<ExprId>],
-    part: &ConnectedBlock,
-) -> Vec<Vec<(usize, ExprId)>> {
+fn cancelling_rows(graph: &mut Graph, matrix: &[Vec<ExprId>], part: &ConnectedBlock) -> Vec<Vec<(usize, ExprId)>> {
     // Rows without own columns are equations of the torn unknowns already.
     if part.columns.is_empty() {
-        return part
-            .rows
-            .iter()
-            .map(|row| vec![(*row, Graph::ONE)])
-            .collect();
+        return part.rows.iter().map(|row| vec![(*row, Graph::ONE)]).collect();
     }
     // A square part only determines its own unknowns.
     if part.rows.len() == part.columns.len() {
@@ -193,11 +173,7 @@ fn transposed_times(graph: &mut Graph, a: &[Vec<ExprId>], b: &[Vec<ExprId>]) -> 
         .map(|i| {
             (0..m)
                 .map(|j| {
-                    let terms: Vec<ExprId> = a
-                        .iter()
-                        .zip(b)
-                        .map(|(a, b)| graph.mul(a[i], b[j]))
-                        .collect();
+                    let terms: Vec<ExprId> = a.iter().zip(b).map(|(a, b)| graph.mul(a[i], b[j])).collect();
                     graph.add_all(&terms)
                 })
                 .collect()

@@ -214,12 +214,7 @@ impl PrintedFormula {
     }
 
     /// Distributes one factor: numbers go into `number`, and the parts of a term to the lists above and below the line.
-    fn gather_factor(
-        one: Self,
-        number: &mut Rational,
-        above: &mut Vec<Self>,
-        below: &mut Vec<Self>,
-    ) {
+    fn gather_factor(one: Self, number: &mut Rational, above: &mut Vec<Self>, below: &mut Vec<Self>) {
         match one {
             Self::Number(n) => *number = &*number * &n,
             Self::Term {
@@ -275,18 +270,9 @@ impl PrintedFormula {
             (base, 1) => base,
             (Self::Number(value), m) => Self::Number(value.pow(i32::try_from(m).unwrap_or(1))),
             (Self::Power(base, k), m) => Self::Power(base, k * m),
-            (
-                Self::Term {
-                    factor,
-                    above,
-                    below,
-                },
-                m,
-            ) => {
+            (Self::Term { factor, above, below }, m) => {
                 let exponent = i32::try_from(m).unwrap_or(1);
-                let raise = |x: Vec<Self>| -> Vec<Self> {
-                    x.into_iter().map(|one| one.power(exponent)).collect()
-                };
+                let raise = |x: Vec<Self>| -> Vec<Self> { x.into_iter().map(|one| one.power(exponent)).collect() };
                 Self::term(factor.pow(exponent), raise(above), raise(below))
             }
             (base, m) => Self::Power(Box::new(base), m),

@@ -3,8 +3,7 @@
 //! An exact expression of a mechanism goes in; a formula with the names of the file comes out.
 
 use modelmill_spec::{
-    ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism,
-    PlaceQuantity,
+    ExactAngle, ExactExpression, ExactFunction as FileFunction, ExactLength, Mechanism, PlaceQuantity,
 };
 
 use super::formula::{FormulaFunction, PrintedFormula};
@@ -19,23 +18,15 @@ pub fn exact_formula(mechanism: &Mechanism, expression: &ExactExpression) -> Pri
 
 /// The formula of an exact expression that acts at the first of two places: `x`, `x_d`, `x_dd` and `load` are the
 /// quantities of a place `x`.
-pub fn exact_formula_at(
-    mechanism: &Mechanism,
-    expression: &ExactExpression,
-    places: [&str; 2],
-) -> PrintedFormula {
+pub fn exact_formula_at(mechanism: &Mechanism, expression: &ExactExpression, places: [&str; 2]) -> PrintedFormula {
     // Formula of an operand.
     let of = |inner: &ExactExpression| exact_formula_at(mechanism, inner, places);
     match expression {
         ExactExpression::Rational(value) => PrintedFormula::Number(Rational::from(value.clone())),
         ExactExpression::Pi => PrintedFormula::name("pi"),
-        ExactExpression::Symbol(symbol) => {
-            PrintedFormula::Symbol(symbol_name(mechanism, *symbol, places))
-        }
+        ExactExpression::Symbol(symbol) => PrintedFormula::Symbol(symbol_name(mechanism, *symbol, places)),
         ExactExpression::Sum(terms) => PrintedFormula::sum(terms.iter().map(of)),
-        ExactExpression::Product(factors) => {
-            PrintedFormula::product(Rational::ONE, factors.iter().map(of))
-        }
+        ExactExpression::Product(factors) => PrintedFormula::product(Rational::ONE, factors.iter().map(of)),
         ExactExpression::Quotient(above, below) => PrintedFormula::quotient(of(above), of(below)),
         ExactExpression::Negative(inner) => of(inner).negate(),
         ExactExpression::Power(base, n) => of(base).power(*n),
@@ -58,10 +49,7 @@ pub fn exact_formula_at(
 /// The formula of an angle.
 pub fn angle_formula(mechanism: &Mechanism, angle: &ExactAngle) -> PrintedFormula {
     // The constant part, as a multiple of pi.
-    let turns = PrintedFormula::product(
-        Rational::from(angle.pi.clone()),
-        [PrintedFormula::name("pi")],
-    );
+    let turns = PrintedFormula::product(Rational::from(angle.pi.clone()), [PrintedFormula::name("pi")]);
     // Coordinates and constants with their integer factors.
     let terms = angle.terms.iter().map(|(symbol, n)| {
         let symbol = PrintedFormula::Symbol(symbol_name(mechanism, *symbol, ["x", "other"]));
@@ -77,19 +65,11 @@ pub fn length_formula(mechanism: &Mechanism, length: &ExactLength) -> PrintedFor
         let name = PrintedFormula::name(&*mechanism.coordinates[i.0].name);
         PrintedFormula::product(Rational::from(k.clone()), [name])
     });
-    PrintedFormula::sum(
-        [exact_formula(mechanism, &length.offset)]
-            .into_iter()
-            .chain(slides),
-    )
+    PrintedFormula::sum([exact_formula(mechanism, &length.offset)].into_iter().chain(slides))
 }
 
 /// The printed name of a symbol of the model file; `x` and `other` name the quantities of an effect's two places.
-fn symbol_name(
-    mechanism: &Mechanism,
-    symbol: modelmill_spec::ModelSymbol,
-    [x, other]: [&str; 2],
-) -> FormulaSymbol {
+fn symbol_name(mechanism: &Mechanism, symbol: modelmill_spec::ModelSymbol, [x, other]: [&str; 2]) -> FormulaSymbol {
     use modelmill_spec::ModelSymbol as Named;
     // Rates and accelerations of places get the suffixes `_d` and `_dd`.
     match symbol {

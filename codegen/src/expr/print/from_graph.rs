@@ -30,12 +30,8 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
     match graph.node(id) {
         Node::Rational(value) => PrintedFormula::Number(value.clone()),
         Node::Atom(a) => PrintedFormula::Symbol(atom(mechanism, *a)),
-        Node::Sin(angle) => {
-            PrintedFormula::apply(FormulaFunction::Sin, angle_sum_formula(mechanism, angle))
-        }
-        Node::Cos(angle) => {
-            PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle))
-        }
+        Node::Sin(angle) => PrintedFormula::apply(FormulaFunction::Sin, angle_sum_formula(mechanism, angle)),
+        Node::Cos(angle) => PrintedFormula::apply(FormulaFunction::Cos, angle_sum_formula(mechanism, angle)),
         // Every term with its rational factor.
         Node::Sum(terms) => PrintedFormula::sum(
             terms
@@ -46,10 +42,7 @@ pub fn formula(graph: &Graph, mechanism: &Mechanism, id: ExprId) -> PrintedFormu
             // Factors are printed in the order that a person would write, not in the order of their ids.
             let mut factors = factors.clone();
             factors.sort_by_key(|(id, _)| factor_rank(graph, *id));
-            let product = PrintedFormula::product(
-                Rational::ONE,
-                factors.iter().map(|(base, n)| of(*base).power(*n)),
-            );
+            let product = PrintedFormula::product(Rational::ONE, factors.iter().map(|(base, n)| of(*base).power(*n)));
             order_factors(product)
         }
         Node::Unary(function, inner) => PrintedFormula::apply((*function).into(), of(*inner)),
@@ -114,11 +107,7 @@ fn order_factors(product: PrintedFormula) -> PrintedFormula {
         } => {
             above.sort_by_key(printed_rank);
             below.sort_by_key(printed_rank);
-            PrintedFormula::Term {
-                factor,
-                above,
-                below,
-            }
+            PrintedFormula::Term { factor, above, below }
         }
         other => other,
     }

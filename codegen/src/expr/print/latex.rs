@@ -117,10 +117,7 @@ fn write(out: &mut String, formula: &PrintedFormula, tight: bool) {
 fn power(out: &mut String, base: &PrintedFormula, n: u32) {
     // Where the exponent stands depends on the base.
     match base {
-        PrintedFormula::Apply(
-            f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
-            operands,
-        ) => {
+        PrintedFormula::Apply(f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh), operands) => {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) => {
@@ -141,12 +138,7 @@ fn power(out: &mut String, base: &PrintedFormula, n: u32) {
 }
 
 /// Writes a function with its operands; an exponent stands behind the function's name.
-fn apply(
-    out: &mut String,
-    function: FormulaFunction,
-    exponent: Option<u32>,
-    operands: &[PrintedFormula],
-) {
+fn apply(out: &mut String, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
     // Operands are separated by commas.
     let arguments: Vec<String> = operands.iter().map(PrintedFormula::latex).collect();
     let arguments = arguments.join(", ");
@@ -174,9 +166,7 @@ fn apply(
     }
     // A sine or cosine of one name needs no parentheses.
     match operands {
-        [PrintedFormula::Symbol(_)]
-            if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
-        {
+        [PrintedFormula::Symbol(_)] if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) => {
             _ = write!(out, "{{{arguments}}}");
         }
         _ => _ = write!(out, "\\left({arguments}\\right)"),
@@ -191,11 +181,7 @@ fn magnitude(out: &mut String, formula: &PrintedFormula) {
             (n, Some(d)) => _ = write!(out, "\\frac{{{n}}}{{{d}}}"),
             (n, None) => out.push_str(&n),
         },
-        PrintedFormula::Term {
-            factor,
-            above,
-            below,
-        } => {
+        PrintedFormula::Term { factor, above, below } => {
             let (n, d) = digits(factor);
             // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {

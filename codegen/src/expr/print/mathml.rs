@@ -27,10 +27,8 @@ impl PrintedFormula {
         };
         write(&mut out, self, false);
         out.end_segment();
-        let stretches = out.done.into_iter();
-        stretches
-            .map(|stretch| format!("<mrow>{stretch}</mrow>"))
-            .collect()
+        let segments = out.done.into_iter();
+        segments.map(|segment| format!("<mrow>{stretch}</mrow>")).collect()
     }
 }
 
@@ -139,12 +137,7 @@ fn glyphs(one: &GlyphRun) -> String {
 }
 
 /// Writes a body between two fences, such as parentheses.
-fn write_fenced(
-    out: &mut MathmlWriter,
-    open: &str,
-    close: &str,
-    body: impl FnOnce(&mut MathmlWriter),
-) {
+fn write_fenced(out: &mut MathmlWriter, open: &str, close: &str, body: impl FnOnce(&mut MathmlWriter)) {
     write_fenced_power(out, open, close, None, body);
 }
 
@@ -233,31 +226,22 @@ fn write(out: &mut MathmlWriter, formula: &PrintedFormula, tight: bool) {
 /// Writes a power: the exponent stands behind the name of sine, cosine and tanh, and behind the base otherwise.
 fn power(out: &mut MathmlWriter, base: &PrintedFormula, n: u32) {
     match base {
-        PrintedFormula::Apply(
-            f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh),
-            operands,
-        ) => {
+        PrintedFormula::Apply(f @ (FormulaFunction::Sin | FormulaFunction::Cos | FormulaFunction::Tanh), operands) => {
             apply(out, *f, Some(n), operands);
         }
         PrintedFormula::Symbol(symbol) => out.push_str(&symbol.mathml_power(Some(n))),
         // Indices and bars stay in one piece with their exponent.
-        PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out
-            .write_unbroken(|out| {
-                out.push_str("<msup><mrow>");
-                write(out, base, true);
-                _ = write!(out, "</mrow><mn>{n}</mn></msup>");
-            }),
+        PrintedFormula::Indexed(..) | PrintedFormula::Apply(FormulaFunction::Abs, _) => out.write_unbroken(|out| {
+            out.push_str("<msup><mrow>");
+            write(out, base, true);
+            _ = write!(out, "</mrow><mn>{n}</mn></msup>");
+        }),
         other => write_fenced_power(out, "(", ")", Some(n), |out| write(out, other, false)),
     }
 }
 
 /// Writes a function with its operands; an exponent stands behind the function's name.
-fn apply(
-    out: &mut MathmlWriter,
-    function: FormulaFunction,
-    exponent: Option<u32>,
-    operands: &[PrintedFormula],
-) {
+fn apply(out: &mut MathmlWriter, function: FormulaFunction, exponent: Option<u32>, operands: &[PrintedFormula]) {
     // Operands are separated by commas.
     let arguments = |out: &mut MathmlWriter| {
         for (i, operand) in operands.iter().enumerate() {
@@ -297,9 +281,7 @@ fn apply(
     }
     // A sine or cosine of one name needs no parentheses.
     match operands {
-        [PrintedFormula::Symbol(_)]
-            if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) =>
-        {
+        [PrintedFormula::Symbol(_)] if matches!(function, FormulaFunction::Sin | FormulaFunction::Cos) => {
             out.push_str("<mo lspace=\"0\" rspace=\"0.17em\">&#x2061;</mo>");
             arguments(out);
         }
@@ -318,11 +300,7 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
             (n, Some(d)) => _ = write!(out, "<mfrac><mn>{n}</mn><mn>{d}</mn></mfrac>"),
             (n, None) => _ = write!(out, "<mn>{n}</mn>"),
         },
-        PrintedFormula::Term {
-            factor,
-            above,
-            below,
-        } => {
+        PrintedFormula::Term { factor, above, below } => {
             let (n, d) = digits(factor);
             // Without a denominator no fraction is needed.
             if d.is_none() && below.is_empty() {
@@ -356,12 +334,7 @@ fn magnitude(out: &mut MathmlWriter, formula: &PrintedFormula) {
 }
 
 /// A product on one line. `tight` encloses sums; on the line of a fraction a single factor needs no parentheses.
-fn write_product_line(
-    out: &mut MathmlWriter,
-    number: &str,
-    factors: &[PrintedFormula],
-    tight: bool,
-) {
+fn write_product_line(out: &mut MathmlWriter, number: &str, factors: &[PrintedFormula], tight: bool) {
     // The number 1 is written only if nothing else is on the line.
     let with_number = number != "1" || factors.is_empty();
     if with_number {

@@ -34,11 +34,7 @@ pub(crate) fn parse(text: &str) -> ParsedFormula {
         rest: text.trim(),
     };
     let read = reader.sum();
-    assert!(
-        reader.rest.is_empty(),
-        "left over in {text}: {}",
-        reader.rest
-    );
+    assert!(reader.rest.is_empty(), "left over in {text}: {}", reader.rest);
     read
 }
 
@@ -62,12 +58,7 @@ impl FormulaReader<'_> {
 
     /// Reads one character, which must come next.
     fn expect(&mut self, wanted: char) {
-        assert!(
-            self.take(wanted),
-            "no {wanted} in {} at {}",
-            self.text,
-            self.rest
-        );
+        assert!(self.take(wanted), "no {wanted} in {} at {}", self.text, self.rest);
     }
 
     /// Reads the longest word of characters that belong to it.
@@ -139,12 +130,7 @@ impl FormulaReader<'_> {
             return ParsedFormula::Number(Rational::from(value));
         }
         let name = self.word(|c| c.is_alphanumeric() || c == '_');
-        assert!(
-            !name.is_empty(),
-            "no operand in {} at {}",
-            self.text,
-            self.rest
-        );
+        assert!(!name.is_empty(), "no operand in {} at {}", self.text, self.rest);
         // A name with a parenthesis is a function.
         if !self.take('(') {
             return ParsedFormula::Name(name);
@@ -165,9 +151,7 @@ impl ParsedFormula {
         match self {
             Self::Number(n) => n.to_f64(),
             Self::Name(name) if name == "pi" => std::f64::consts::PI,
-            Self::Name(name) => *names
-                .get(name)
-                .unwrap_or_else(|| panic!("{name} has no value yet")),
+            Self::Name(name) => *names.get(name).unwrap_or_else(|| panic!("{name} has no value yet")),
             Self::Add(a, b) => of(a) + of(b),
             Self::Sub(a, b) => of(a) - of(b),
             Self::Mul(a, b) => of(a) * of(b),
@@ -192,15 +176,10 @@ impl ParsedFormula {
     }
 
     /// Its value in any domain; `None` where it does not exist. Names must be in `names`.
-    pub(crate) fn value<D: EvaluationDomain>(
-        &self,
-        domain: &D,
-        names: &BTreeMap<String, Atom>,
-    ) -> Option<D::Value> {
+    pub(crate) fn value<D: EvaluationDomain>(&self, domain: &D, names: &BTreeMap<String, Atom>) -> Option<D::Value> {
         let of = |r: &Self| r.value(domain, names);
         // k times a value of the domain.
-        let scaled =
-            |a: D::Value, k: i64| Some(domain.mul(&domain.rational(&Rational::integer(k))?, &a));
+        let scaled = |a: D::Value, k: i64| Some(domain.mul(&domain.rational(&Rational::integer(k))?, &a));
         match self {
             Self::Number(n) => domain.rational(n),
             Self::Name(name) => domain.atom(names[name]),
@@ -247,11 +226,7 @@ impl ParsedFormula {
             Self::Mul(a, b) => match a.as_ref() {
                 Self::Number(n) => {
                     let (n, _) = n.as_small().expect("a small factor");
-                    b.angle(
-                        factor * i32::try_from(n).expect("a small factor"),
-                        names,
-                        terms,
-                    );
+                    b.angle(factor * i32::try_from(n).expect("a small factor"), names, terms);
                 }
                 other => panic!("no integer factor of an angle: {other:?}"),
             },

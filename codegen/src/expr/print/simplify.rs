@@ -19,34 +19,21 @@ impl SplitTerm {
     fn new(formula: PrintedFormula) -> Self {
         let (factor, above, below) = match formula {
             PrintedFormula::Number(n) => (n, Vec::new(), Vec::new()),
-            PrintedFormula::Term {
-                factor,
-                above,
-                below,
-            } => (factor, above, below),
+            PrintedFormula::Term { factor, above, below } => (factor, above, below),
             other => (Rational::ONE, vec![other], Vec::new()),
         };
-        Self {
-            factor,
-            above,
-            below,
-        }
+        Self { factor, above, below }
     }
 
     /// For every factor that is the square of a sine or cosine: the function, its angle, and the other factors above
     /// the line.
-    fn without_squares(
-        &self,
-    ) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
+    fn without_squares(&self) -> impl Iterator<Item = (FormulaFunction, &PrintedFormula, Vec<PrintedFormula>)> {
         self.above.iter().enumerate().filter_map(|(i, factor)| {
             // Only squares of one function of one angle count.
             let PrintedFormula::Power(base, 2) = factor else {
                 return None;
             };
-            let PrintedFormula::Apply(
-                function @ (FormulaFunction::Sin | FormulaFunction::Cos),
-                operands,
-            ) = &**base
+            let PrintedFormula::Apply(function @ (FormulaFunction::Sin | FormulaFunction::Cos), operands) = &**base
             else {
                 return None;
             };
@@ -110,14 +97,7 @@ fn insert_term(found: &mut Vec<SplitTerm>, term: SplitTerm) {
     match joined {
         Some((i, above)) => {
             let SplitTerm { factor, below, .. } = found.remove(i);
-            insert_term(
-                found,
-                SplitTerm {
-                    factor,
-                    above,
-                    below,
-                },
-            );
+            insert_term(found, SplitTerm { factor, above, below });
         }
         None => found.push(term),
     }
@@ -160,28 +140,17 @@ mod tests {
     #[test]
     fn what_a_person_sees_is_done() {
         let root = || PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(3));
-        let product =
-            |factors: Vec<PrintedFormula>| PrintedFormula::product(Rational::ONE, factors);
+        let product = |factors: Vec<PrintedFormula>| PrintedFormula::product(Rational::ONE, factors);
         let sum = PrintedFormula::sum([name("R"), product(vec![name("R"), root(), root()])]);
         let quarter = PrintedFormula::product(Rational::new(1, 4), [sum]);
         assert_eq!(quarter, name("R"));
 
         let square = |f| PrintedFormula::apply(f, name("x")).power(2);
         let stroke = |f| PrintedFormula::product(Rational::MINUS_ONE, [name("stroke"), square(f)]);
-        let sum = PrintedFormula::sum([
-            stroke(FormulaFunction::Sin),
-            name("a"),
-            stroke(FormulaFunction::Cos),
-        ]);
-        assert_eq!(
-            sum,
-            PrintedFormula::sum([name("a"), name("stroke").negate()])
-        );
+        let sum = PrintedFormula::sum([stroke(FormulaFunction::Sin), name("a"), stroke(FormulaFunction::Cos)]);
+        assert_eq!(sum, PrintedFormula::sum([name("a"), name("stroke").negate()]));
 
-        let difference = PrintedFormula::sum([
-            square(FormulaFunction::Cos),
-            square(FormulaFunction::Sin).negate(),
-        ]);
+        let difference = PrintedFormula::sum([square(FormulaFunction::Cos), square(FormulaFunction::Sin).negate()]);
         assert!(matches!(difference, PrintedFormula::Sum(terms) if terms.len() == 2));
         assert!(PrintedFormula::sum([name("a"), name("a").negate()]).is_zero());
     }

@@ -105,9 +105,7 @@ const LONGEST_SYMBOL: usize = 3;
 pub(crate) fn typeset(name: &str) -> TypesetName {
     // The part before the first underscore has the letter; the parts after it are parts of the index.
     let (head, tail) = name.split_once('_').unwrap_or((name, ""));
-    let letters_end = head
-        .find(|c: char| !c.is_alphabetic())
-        .unwrap_or(head.len());
+    let letters_end = head.find(|c: char| !c.is_alphabetic()).unwrap_or(head.len());
     let (letters, digits) = head.split_at(letters_end);
     let mut index: Vec<Vec<GlyphRun>> = Vec::new();
     // A Greek letter, a word, or a letter whose other letters begin the index.
@@ -125,11 +123,7 @@ pub(crate) fn typeset(name: &str) -> TypesetName {
     if !first_part.is_empty() {
         index.push(vec![GlyphRun::Italic(first_part)]);
     }
-    index.extend(
-        tail.split('_')
-            .filter(|part| !part.is_empty())
-            .map(index_part),
-    );
+    index.extend(tail.split('_').filter(|part| !part.is_empty()).map(index_part));
     TypesetName { base, index }
 }
 
@@ -143,9 +137,7 @@ fn is_word(letters: &str) -> bool {
 
 /// The style runs of one part of an index: a Greek letter with digits, a word, or italics.
 fn index_part(part: &str) -> Vec<GlyphRun> {
-    let end = part
-        .find(|c: char| !c.is_alphabetic())
-        .unwrap_or(part.len());
+    let end = part.find(|c: char| !c.is_alphabetic()).unwrap_or(part.len());
     let (letters, digits) = part.split_at(end);
     if let Some(letter) = greek(letters) {
         let mut glyphs = vec![letter];

@@ -24,9 +24,7 @@ enum Recipe {
 
 impl Recipe {
     fn build(&self, graph: &mut Graph) -> ExprId {
-        let angle = |terms: &[(usize, i32)]| {
-            AtomAngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)))
-        };
+        let angle = |terms: &[(usize, i32)]| AtomAngleSum::new(terms.iter().map(|(i, n)| (Atom::Coordinate(*i), *n)));
         match self {
             Self::Number(n, d) => graph.rational(Rational::new(*n, *d)),
             Self::Atom(a) => graph.atom(*a),
@@ -109,10 +107,7 @@ fn point(mechanism: &Mechanism) -> (BTreeMap<String, Atom>, FieldPoint) {
         at.values.insert(*a, stream.next_element());
         at.angles.insert(*a, stream.next_circle_point());
     }
-    let names = atoms
-        .into_iter()
-        .map(|a| (atom(mechanism, a).text(), a))
-        .collect();
+    let names = atoms.into_iter().map(|a| (atom(mechanism, a).text(), a)).collect();
     (names, at)
 }
 
@@ -146,9 +141,7 @@ pub(crate) fn markup_is_balanced(markup: &str) -> bool {
                     return false;
                 }
             }
-            None if tag.ends_with('/')
-                || tag.starts_with('!')
-                || ["meta", "link", "br"].contains(&name) => {}
+            None if tag.ends_with('/') || tag.starts_with('!') || ["meta", "link", "br"].contains(&name) => {}
             None => open.push(name),
         }
     }
@@ -175,11 +168,11 @@ proptest! {
         let mathml = printed.mathml();
         prop_assert!(markup_is_balanced(&mathml), "{}", mathml);
         // In segments the text is the same; only parts that were too wide are written with other signs.
-        let stretches = printed.mathml_segments();
-        for stretch in &stretches {
-            prop_assert!(markup_is_balanced(stretch), "{}", stretch);
+        let segments = printed.mathml_segments();
+        for segment in &segments {
+            prop_assert!(markup_is_balanced(segment), "{}", segment);
         }
-        prop_assert_eq!(words(&stretches.concat()), words(&mathml), "{}", text);
+        prop_assert_eq!(words(&segments.concat()), words(&mathml), "{}", text);
     }
 }
 
@@ -199,22 +192,18 @@ fn words(markup: &str) -> String {
 #[test]
 fn long_formulas_can_be_parted_within_parentheses_fractions_and_roots() {
     let sum = |letter: &str| {
-        let terms = (1..9).map(|k| {
-            PrintedFormula::product(
-                Rational::integer(1),
-                [name(&format!("{letter}{k}")), name("d1")],
-            )
-        });
+        let terms =
+            (1..9).map(|k| PrintedFormula::product(Rational::integer(1), [name(&format!("{letter}{k}")), name("d1")]));
         PrintedFormula::sum(terms)
     };
     let quotient = PrintedFormula::quotient(sum("m"), sum("k"));
     let root = PrintedFormula::apply(FormulaFunction::Sqrt, sum("x"));
     let all = PrintedFormula::product(Rational::integer(3), [sum("a"), root, quotient]);
-    let stretches = all.mathml_segments();
-    assert!(stretches.len() >= 4 * 7, "{}", stretches.len());
-    for stretch in &stretches {
-        assert!(markup_is_balanced(stretch), "{stretch}");
-        assert!(words(stretch).chars().count() < 40, "{stretch}");
+    let segments = all.mathml_segments();
+    assert!(segments.len() >= 4 * 7, "{}", segments.len());
+    for segment in &segments {
+        assert!(markup_is_balanced(segment), "{stretch}");
+        assert!(words(segment).chars().count() < 40, "{stretch}");
     }
 }
 
@@ -248,10 +237,7 @@ fn names_are_typeset_as_engineers_write_them() {
     ] {
         assert_eq!(FormulaSymbol::new(plain).latex(), latex, "{plain}");
     }
-    assert_eq!(
-        FormulaSymbol::time_derivative("theta1", 2).text(),
-        "theta1_dd"
-    );
+    assert_eq!(FormulaSymbol::time_derivative("theta1", 2).text(), "theta1_dd");
     assert_eq!(
         FormulaSymbol::time_derivative("theta1", 2).latex(),
         "\\ddot{\\theta}_{1}"
@@ -261,11 +247,7 @@ fn names_are_typeset_as_engineers_write_them() {
 #[test]
 fn signs_fractions_and_powers_are_tidy() {
     let half = Rational::new(1, 2);
-    let term = PrintedFormula::term(
-        half.clone(),
-        [name("d1"), name("m4"), name("dc3")],
-        [name("d3")],
-    );
+    let term = PrintedFormula::term(half.clone(), [name("d1"), name("m4"), name("dc3")], [name("d3")]);
     check(
         &PrintedFormula::sum([name("m3").negate(), term]),
         "1/2*d1*m4*dc3/d3 - m3",

@@ -36,16 +36,12 @@ fn write_at(f: &mut dyn Write, formula: &PrintedFormula, level: TextPrecedence) 
     // Negative numbers and fractions need parentheses in products.
     let enclosed = match formula {
         PrintedFormula::Sum(_) => level > TextPrecedence::Sum,
-        PrintedFormula::Number(n) => {
-            level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer())
-        }
+        PrintedFormula::Number(n) => level > TextPrecedence::Sum && (n.is_negative() || !n.is_integer()),
         PrintedFormula::Term { factor, .. } => {
             level > TextPrecedence::Factor || (level > TextPrecedence::Sum && factor.is_negative())
         }
         PrintedFormula::Power(..) => level > TextPrecedence::Factor,
-        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => {
-            false
-        }
+        PrintedFormula::Symbol(_) | PrintedFormula::Indexed(..) | PrintedFormula::Apply(..) => false,
     };
     // Parentheses around everything that follows.
     if enclosed {
@@ -117,22 +113,13 @@ fn number(f: &mut dyn Write, value: &Rational) -> fmt::Result {
 fn magnitude(f: &mut dyn Write, formula: &PrintedFormula) -> fmt::Result {
     match formula {
         PrintedFormula::Number(n) => number(f, n),
-        PrintedFormula::Term {
-            factor,
-            above,
-            below,
-        } => term(f, factor, above, below),
+        PrintedFormula::Term { factor, above, below } => term(f, factor, above, below),
         other => write_at(f, other, TextPrecedence::Sum),
     }
 }
 
 /// Writes a number times factors, divided by factors, without the sign of the number.
-fn term(
-    f: &mut dyn Write,
-    factor: &Rational,
-    above: &[PrintedFormula],
-    below: &[PrintedFormula],
-) -> fmt::Result {
+fn term(f: &mut dyn Write, factor: &Rational, above: &[PrintedFormula], below: &[PrintedFormula]) -> fmt::Result {
     let (n, d) = digits(factor);
     // Factors below the line, with the denominator of the number if nothing stands above.
     let mut divisors = Vec::new();

@@ -58,12 +58,8 @@ pub(super) fn determined_components(
             let seed = stream.next_bits();
             let drawn = |atom: Atom| match atom {
                 Atom::Pi => std::f64::consts::PI,
-                Atom::Constant(i) => {
-                    0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 1)))
-                }
-                Atom::Coordinate(i) => {
-                    0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 2)))
-                }
+                Atom::Constant(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 1))),
+                Atom::Coordinate(i) => 0.5 + uniform_symmetric(&mut RandomStream::new(seed ^ (2 * i as u64 + 2))),
                 _ => 0.0,
             };
             let Some(found) = reach(free, &drawn) else {

@@ -9,9 +9,7 @@ use super::force_through_point;
 use crate::DeriveError;
 use crate::expr::vector::{self, AxisRotation, SymbolicVector, push_rotation};
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::stretch::{
-    PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments,
-};
+use crate::loops::segment::{PointPairPath, fixed_rotations, inverse_rotations, local_position, sum_segments};
 use crate::newton_euler::{JointLoad, SymbolicWrench, rotate_into_inner};
 use crate::regressor::UnreducedEquations;
 use crate::regressor::mechanics::point_forces;
@@ -77,19 +75,12 @@ fn paths_from_common_link(
         common: shared.checked_sub(1).map(|last| a[last]),
         links: [a[shared..].to_vec(), b[shared..].to_vec()],
         of_points,
-        at: [
-            local_position(graph, points[0])?,
-            local_position(graph, points[1])?,
-        ],
+        at: [local_position(graph, points[0])?, local_position(graph, points[1])?],
     })
 }
 
 /// Rotations along a path of links after the rotations of `start`.
-fn rotations_along(
-    tree: &KinematicTree,
-    start: &[AxisRotation],
-    links: &[usize],
-) -> Vec<AxisRotation> {
+fn rotations_along(tree: &KinematicTree, start: &[AxisRotation], links: &[usize]) -> Vec<AxisRotation> {
     let mut turns = Vec::new();
     let of_links = links.iter().map(|i| &tree.links[*i]);
     let along = of_links.flat_map(|link| link.pre.iter().chain([&link.joint]));
@@ -162,8 +153,7 @@ pub(super) fn cut_loops(
         // Both ends of the cut.
         let sides = [side(0), side(1)];
         // Planar: points stay in a plane, and their frames rotate about its normal only.
-        let is_planar =
-            gap[2] == Graph::ZERO && sides.iter().all(|s| is_rotation_about_z(&s.turns));
+        let is_planar = gap[2] == Graph::ZERO && sides.iter().all(|s| is_rotation_about_z(&s.turns));
         cuts.push(CutLoop {
             name: closed.name.clone(),
             gap,
@@ -267,11 +257,7 @@ pub(super) fn drive_loads(
             let Some(link) = paths.of_points[k].filter(|link| Some(*link) != paths.common) else {
                 continue;
             };
-            let supplied = if k == 0 {
-                force.map(|x| graph.neg(x))
-            } else {
-                force
-            };
+            let supplied = if k == 0 { force.map(|x| graph.neg(x)) } else { force };
             let turns = rotations_along(tree, &[], &paths.links[k]);
             let supplied = rotate_into_inner(graph, &turns, &supplied);
             loads.push(JointLoad {

@@ -102,8 +102,7 @@ fn reactions(
     let mut all = body_wrenches(graph, equations, &value);
     let on_tree = required_forces(graph, mechanism, equations, &value, &all)?;
     let drives = equations.projection.drive_forces(graph, &on_tree)?;
-    let closing_forces =
-        loop_closure_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
+    let closing_forces = loop_closure_forces(graph, mechanism, equations, &cuts, &on_tree, &drives)?;
     all.extend(loads::drive_loads(graph, mechanism, equations, &drives)?);
     all.extend(loads::effect_loads(graph, mechanism, equations, &value)?);
     for cut in &cuts {
@@ -123,8 +122,7 @@ fn reactions(
         components.push(cut.reported_force(graph, tree));
     }
     let components: Vec<ExprId> = components.concat();
-    let determined =
-        determined::determined_components(graph, mechanism, equations, &cuts, &components);
+    let determined = determined::determined_components(graph, mechanism, equations, &cuts, &components);
 
     // Components that are not determined do not depend on the choice of the unknown forces, so these are set to zero.
     let known = loads::known_values(graph, &cuts, &closing_forces.of_gap);
@@ -164,18 +162,11 @@ fn reactions(
         force: three(),
     });
     let loops = loops.collect();
-    Ok(ReactionPrograms {
-        joints,
-        loops,
-        program,
-    })
+    Ok(ReactionPrograms { joints, loops, program })
 }
 
 /// Every product of parameters as an expression of single parameters.
-fn product_values(
-    graph: &mut Graph,
-    equations: &UnreducedEquations,
-) -> BTreeMap<ParameterMonomial, ExprId> {
+fn product_values(graph: &mut Graph, equations: &UnreducedEquations) -> BTreeMap<ParameterMonomial, ExprId> {
     let products = equations.products.iter();
     products
         .map(|m| (m.clone(), base::product_expression(graph, m)))
@@ -189,8 +180,7 @@ fn body_wrenches(
     value: &dyn Fn(&ParameterMonomial) -> ExprId,
 ) -> Vec<JointLoad> {
     let tree = &equations.tree;
-    let motion =
-        newton_euler::forward_recursion(graph, tree, &equations.gravity, RecursionStyle::PLAIN);
+    let motion = newton_euler::forward_recursion(graph, tree, &equations.gravity, RecursionStyle::PLAIN);
     let inertia = equations.inertia.total_inertias(graph, value);
     let loads = inertia.into_iter().map(|(link, inertia)| JointLoad {
         link,
@@ -214,13 +204,7 @@ fn required_forces(
         .iter()
         .map(|load| (load.link, newton_euler::JointSide::Moving, load.wrench))
         .collect();
-    let on_tree = newton_euler::backward_recursion(
-        graph,
-        &equations.tree,
-        RecursionStyle::PLAIN,
-        n,
-        wrenches,
-    );
+    let on_tree = newton_euler::backward_recursion(graph, &equations.tree, RecursionStyle::PLAIN, n, wrenches);
     let effects = equations.effect_forces(graph, mechanism, value)?;
     Ok(on_tree
         .iter()
@@ -300,12 +284,7 @@ fn closing_gaps(
             all.push(gap);
         }
     }
-    if projection
-        .loops
-        .residual
-        .iter()
-        .all(|row| all.contains(row))
-    {
+    if projection.loops.residual.iter().all(|row| all.contains(row)) {
         return projection.loops.residual.clone();
     }
     // Derivatives of all gaps by the passive coordinates, at the nominal pose.
@@ -426,11 +405,7 @@ fn free_links(mechanism: &Mechanism, equations: &UnreducedEquations) -> BTreeSet
 }
 
 /// A force through a point as a wrench about the origin.
-fn force_through_point(
-    graph: &mut Graph,
-    at: &SymbolicVector,
-    force: SymbolicVector,
-) -> SymbolicWrench {
+fn force_through_point(graph: &mut Graph, at: &SymbolicVector, force: SymbolicVector) -> SymbolicWrench {
     let moment = graph.cross(at, &force);
     SymbolicWrench { force, moment }
 }

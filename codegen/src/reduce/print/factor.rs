@@ -139,15 +139,11 @@ fn linear_form_candidates(variables: &[FactorVariable]) -> Vec<TrigonometricPoly
 
 /// The leading term in the lexicographic order of variables, which is compatible with products.
 fn leading_term(p: &TrigonometricPolynomial) -> Option<(&PowerProduct, &Rational)> {
-    p.iter()
-        .max_by(|(a, _), (b, _)| super::compare_powers(b, a))
+    p.iter().max_by(|(a, _), (b, _)| super::compare_powers(b, a))
 }
 
 /// The quotient of two polynomials, if the division has no remainder.
-fn exact_quotient(
-    p: &TrigonometricPolynomial,
-    by: &TrigonometricPolynomial,
-) -> Option<TrigonometricPolynomial> {
+fn exact_quotient(p: &TrigonometricPolynomial, by: &TrigonometricPolynomial) -> Option<TrigonometricPolynomial> {
     // Polynomial long division by leading terms.
     let (lead, k) = leading_term(by)?;
     let inverse = k.recip();
@@ -185,8 +181,7 @@ pub(super) struct SumSquare {
 pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
     let coefficient = |powers: &PowerProduct| p.get(powers).cloned().unwrap_or(Rational::ZERO);
     // Coefficient of a mixed term.
-    let cross =
-        |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
+    let cross = |u: FactorVariable, v: FactorVariable| coefficient(&vec![(u.min(v), 1), (u.max(v), 1)]);
     // Variables with a pure square are candidates.
     let mut variables: Vec<FactorVariable> = p
         .keys()
@@ -231,11 +226,7 @@ pub(super) fn find_squares(p: &TrigonometricPolynomial) -> Vec<SumSquare> {
                 terms.push(vec![(*u.min(v), 1), (*u.max(v), 1)]);
             }
         }
-        found.push(SumSquare {
-            number,
-            linear,
-            terms,
-        });
+        found.push(SumSquare { number, linear, terms });
     }
     found
 }

@@ -7,9 +7,7 @@ use std::collections::BTreeMap;
 
 use modelmill_spec::Mechanism;
 
-use super::rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
-};
+use super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::Rational;
 use crate::expr::print::{FormulaFunction, PrintedFormula};
 
@@ -21,9 +19,7 @@ impl FactorVariable {
             Self::Constant(i) => name(i),
             Self::Cos(i) => PrintedFormula::apply(FormulaFunction::Cos, name(i)),
             Self::Sin(i) => PrintedFormula::apply(FormulaFunction::Sin, name(i)),
-            Self::Root(n) => {
-                PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(n))
-            }
+            Self::Root(n) => PrintedFormula::apply(FormulaFunction::Sqrt, PrintedFormula::integer(n)),
         }
     }
 }
@@ -31,11 +27,7 @@ impl FactorVariable {
 impl RationalFunction {
     /// The terms of the expanded numerator, each divided by the denominator and multiplied by `factors`: the form that
     /// a script reads.
-    pub fn expanded_terms(
-        &self,
-        mechanism: &Mechanism,
-        factors: &[PrintedFormula],
-    ) -> Vec<PrintedFormula> {
+    pub fn expanded_terms(&self, mechanism: &Mechanism, factors: &[PrintedFormula]) -> Vec<PrintedFormula> {
         // A denominator of one term is divided factor by factor, any other one as a whole.
         let below = match self.denominator.first_key_value() {
             Some((powers, k)) if self.denominator.len() == 1 => {
@@ -86,10 +78,7 @@ impl RationalFunction {
             content = -&content;
         }
         // The number of the denominator belongs to the factor as well.
-        let below = self
-            .denominator
-            .values()
-            .fold(Rational::ZERO, |c, k| c.content_with(k));
+        let below = self.denominator.values().fold(Rational::ZERO, |c, k| c.content_with(k));
         // A polynomial divided by a number.
         let scaled = |p: &TrigonometricPolynomial, by: &Rational| -> TrigonometricPolynomial {
             let inverse = by.recip();
@@ -152,17 +141,14 @@ fn compare_powers(a: &PowerProduct, b: &PowerProduct) -> Ordering {
 /// A polynomial as a sum of terms in the usual order.
 fn expand_polynomial(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> PrintedFormula {
     PrintedFormula::sum(
-        ordered_terms(p).into_iter().map(|(powers, k)| {
-            PrintedFormula::product(k.clone(), power_factors(powers, mechanism))
-        }),
+        ordered_terms(p)
+            .into_iter()
+            .map(|(powers, k)| PrintedFormula::product(k.clone(), power_factors(powers, mechanism))),
     )
 }
 
 /// The rational factor of a polynomial and its other factors.
-fn polynomial_factors(
-    p: &TrigonometricPolynomial,
-    mechanism: &Mechanism,
-) -> (Rational, Vec<PrintedFormula>) {
+fn polynomial_factors(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> (Rational, Vec<PrintedFormula>) {
     let factor::FactoredPolynomial {
         number,
         monomial,
@@ -192,10 +178,7 @@ fn gather_squares(p: &TrigonometricPolynomial, mechanism: &Mechanism) -> Printed
                 .iter()
                 .map(|(v, k)| PrintedFormula::product(k.clone(), [v.formula(mechanism)])),
         );
-        squares.insert(
-            first,
-            PrintedFormula::product(square.number, [sum.power(2)]),
-        );
+        squares.insert(first, PrintedFormula::product(square.number, [sum.power(2)]));
         for used in &square.terms {
             rest.remove(used);
         }

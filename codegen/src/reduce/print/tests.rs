@@ -6,9 +6,7 @@ use modelmill_algebra::field::{FieldElement, RandomStream};
 
 use proptest::prelude::*;
 
-use super::super::rational_function::{
-    FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial,
-};
+use super::super::rational_function::{FactorVariable, PowerProduct, RationalFunction, TrigonometricPolynomial};
 use crate::expr::print::parse::parse;
 use crate::expr::{Atom, FieldPoint, Rational};
 use crate::review::tests::model;
@@ -21,9 +19,7 @@ fn multiply(a: &TrigonometricPolynomial, b: &TrigonometricPolynomial) -> Trigono
             for (v, n) in q {
                 *powers.entry(*v).or_insert(0) += n;
             }
-            let slot = product
-                .entry(powers.into_iter().collect())
-                .or_insert(Rational::ZERO);
+            let slot = product.entry(powers.into_iter().collect()).or_insert(Rational::ZERO);
             *slot = &*slot + &(k * l);
         }
     }
@@ -57,11 +53,8 @@ fn linear() -> impl Strategy<Value = TrigonometricPolynomial> {
 }
 
 fn product() -> impl Strategy<Value = TrigonometricPolynomial> {
-    prop::collection::vec(linear(), 1..4).prop_map(|factors| {
-        factors
-            .iter()
-            .fold(polynomial(&[(1, &[])]), |p, f| multiply(&p, f))
-    })
+    prop::collection::vec(linear(), 1..4)
+        .prop_map(|factors| factors.iter().fold(polynomial(&[(1, &[])]), |p, f| multiply(&p, f)))
 }
 
 fn sum_of_products() -> impl Strategy<Value = TrigonometricPolynomial> {
@@ -110,11 +103,7 @@ proptest! {
 }
 
 /// Constants of the model are d1, d3, b, dA, Bx, ... in this order.
-fn check(
-    numerator: &TrigonometricPolynomial,
-    denominator: &TrigonometricPolynomial,
-    expected: &str,
-) {
+fn check(numerator: &TrigonometricPolynomial, denominator: &TrigonometricPolynomial, expected: &str) {
     let mechanism = model("spidermill-paper");
     let function = RationalFunction::new(numerator.clone(), denominator.clone());
     assert_eq!(function.formula(&mechanism).text(), expected);
@@ -127,21 +116,13 @@ fn numbers_and_powers_stand_outside() {
         &polynomial(&[(6, &[2])]),
         "1/3*d1*d3*(d1 + 2*d3)/b",
     );
-    check(
-        &polynomial(&[(-1, &[0])]),
-        &polynomial(&[(2, &[1])]),
-        "-1/2*d1/d3",
-    );
+    check(&polynomial(&[(-1, &[0])]), &polynomial(&[(2, &[1])]), "-1/2*d1/d3");
 }
 
 #[test]
 fn squares_and_their_differences_are_seen() {
     let one = polynomial(&[(1, &[])]);
-    check(
-        &polynomial(&[(1, &[0, 0]), (-1, &[1, 1])]),
-        &one,
-        "(d1 + d3)*(d1 - d3)",
-    );
+    check(&polynomial(&[(1, &[0, 0]), (-1, &[1, 1])]), &one, "(d1 + d3)*(d1 - d3)");
     check(
         &polynomial(&[(1, &[0, 0]), (2, &[0, 1]), (1, &[1, 1])]),
         &one,
@@ -153,11 +134,7 @@ fn squares_and_their_differences_are_seen() {
         &one,
         "(d1 + d3)^2 + b^2",
     );
-    check(
-        &polynomial(&[(1, &[0, 0]), (1, &[1, 1])]),
-        &one,
-        "d1^2 + d3^2",
-    );
+    check(&polynomial(&[(1, &[0, 0]), (1, &[1, 1])]), &one, "d1^2 + d3^2");
 }
 
 /// The same at random points, with fewer terms where even powers of a cosine make up one of the sine.
@@ -178,8 +155,7 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         (vec![(cosine, 2)], Rational::integer(-2)),
         (vec![(cosine, 4)], one.clone()),
     ]);
-    let kept =
-        TrigonometricPolynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
+    let kept = TrigonometricPolynomial::from([(vec![(cosine, 2)], one.clone()), (vec![(sine, 1)], one)]);
     for (p, n_terms, power_of_sine) in [(numerator, 1, 2), (quartic, 1, 4), (kept, 2, 1)] {
         let written = RationalFunction {
             numerator: p.clone(),
@@ -193,12 +169,8 @@ fn even_powers_of_cosines_become_sines_where_that_is_shorter() {
         for _ in 0..4 {
             let mut point = FieldPoint::<FieldElement>::default();
             for i in 0..2 {
-                point
-                    .values
-                    .insert(Atom::Constant(i), stream.next_element());
-                point
-                    .angles
-                    .insert(Atom::Constant(i), stream.next_circle_point());
+                point.values.insert(Atom::Constant(i), stream.next_element());
+                point.angles.insert(Atom::Constant(i), stream.next_circle_point());
             }
             assert_eq!(found.value(&point), written.value(&point));
         }

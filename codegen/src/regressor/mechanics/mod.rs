@@ -22,13 +22,10 @@ pub(crate) fn generalised_forces(
     effect: &ModelEffect,
 ) -> Result<Vec<Vec<Vec<ExprId>>>, DeriveError> {
     match effect.mechanics {
-        Some(Mechanics::Rod) => {
-            rod::generalised_forces(graph, mechanism, tree, projection, gravity, effect)
-        }
+        Some(Mechanics::Rod) => rod::generalised_forces(graph, mechanism, tree, projection, gravity, effect),
         Some(Mechanics::Strut) => strut::generalised_forces(graph, mechanism, tree, effect),
         // Their bodies are part of the mechanism's, and gravity is rotated already.
-        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
-        | None => Ok(Vec::new()),
+        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay) | None => Ok(Vec::new()),
     }
 }
 
@@ -43,11 +40,8 @@ pub(crate) fn point_forces(
     values: &[ExprId],
 ) -> Result<Vec<(PointIdx, SymbolicVector)>, DeriveError> {
     match effect.mechanics {
-        Some(Mechanics::Rod) => {
-            rod::point_forces(graph, mechanism, tree, projection, gravity, effect, values)
-        }
+        Some(Mechanics::Rod) => rod::point_forces(graph, mechanism, tree, projection, gravity, effect, values),
         Some(Mechanics::Strut) => strut::point_forces(graph, mechanism, tree, effect, values),
-        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay)
-        | None => Ok(Vec::new()),
+        Some(Mechanics::Placement | Mechanics::Part | Mechanics::Tilt | Mechanics::Delay) | None => Ok(Vec::new()),
     }
 }

@@ -10,7 +10,7 @@ use modelmill_spec::{DriveIdx, DriveKind, EffectPlace, Mechanism, ModelEffect, P
 use crate::DeriveError;
 use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph};
-use crate::loops::stretch::position_in_base;
+use crate::loops::segment::position_in_base;
 use crate::regressor::projection::LoopProjection;
 use crate::tree::KinematicTree;
 

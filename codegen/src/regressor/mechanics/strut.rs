@@ -9,7 +9,7 @@ use modelmill_spec::{EffectPlace, Mechanism, ModelEffect, PointIdx};
 use crate::DeriveError;
 use crate::expr::vector::SymbolicVector;
 use crate::expr::{Atom, ExprId, Graph, Unary};
-use crate::loops::stretch::position_in_base;
+use crate::loops::segment::position_in_base;
 use crate::tree::KinematicTree;
 
 /// The line between the points of an effect.
@@ -82,8 +82,7 @@ pub(super) fn point_forces(
     let Some(line) = strut_line(graph, mechanism, tree, effect)? else {
         return Ok(Vec::new());
     };
-    let [constant, stiffness, damping] =
-        [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
+    let [constant, stiffness, damping] = [0, 1, 2].map(|k| values.get(k).copied().unwrap_or(Graph::ZERO));
     let rate = distance_rate(graph, &line);
     let by_distance = graph.mul(stiffness, line.length);
     let by_rate = graph.mul(damping, rate);

@@ -9,15 +9,9 @@ use crate::language::syntax::LanguageSyntax;
 /// Status codes in the order of their values: name after the prefix, and meaning.
 const STATUS: [(&str, &str); 6] = [
     ("OK", "no error"),
-    (
-        "OUT_OF_REACH",
-        "the loops cannot close: the pose is out of reach",
-    ),
+    ("OUT_OF_REACH", "the loops cannot close: the pose is out of reach"),
     ("SINGULAR", "the pose is singular"),
-    (
-        "UNDEFINED",
-        "a term of the model has no finite value at this state",
-    ),
+    ("UNDEFINED", "a term of the model has no finite value at this state"),
     ("NOT_FINITE", "an input is NaN, infinite, or above 1e60"),
     (
         "SPECIAL",
@@ -92,11 +86,7 @@ extern \"C\" {{
             _ = writeln!(text, "#define {upper}_{prefix}_{} {k}", c.name(place));
         }
     };
-    places(
-        "Coordinates",
-        "COORDINATE",
-        active.iter().map(coordinate).collect(),
-    );
+    places("Coordinates", "COORDINATE", active.iter().map(coordinate).collect());
     places(
         "Passive coordinates",
         "PASSIVE",
@@ -128,12 +118,7 @@ extern \"C\" {{
         }
         // The unit of each field is its comment.
         for (field, measure) in fields {
-            _ = writeln!(
-                text,
-                "    double {}; /* {} */",
-                c.name(field),
-                comment(measure)
-            );
+            _ = writeln!(text, "    double {}; /* {} */", c.name(field), comment(measure));
         }
         _ = writeln!(text, "}} {}_{name};", unit.name);
     };
@@ -288,30 +273,15 @@ fn source_names(reactions: &modelmill_codegen::ReactionPrograms) -> Vec<String> 
 }
 
 /// The declaration of a function of one state.
-pub(super) fn signature(
-    unit: &TranslationUnit<'_>,
-    function: &CFunction<'_>,
-    owner: &str,
-    near: bool,
-) -> String {
+pub(super) fn signature(unit: &TranslationUnit<'_>, function: &CFunction<'_>, owner: &str, near: bool) -> String {
     declaration(unit, function.name, owner, near, function.result)
 }
 
 /// A declaration with the arguments that all functions of a state share; `near` adds the passive coordinates.
-fn declaration(
-    unit: &TranslationUnit<'_>,
-    what: &str,
-    owner: &str,
-    near: bool,
-    result: &str,
-) -> String {
+fn declaration(unit: &TranslationUnit<'_>, what: &str, owner: &str, near: bool, result: &str) -> String {
     let name = &unit.name;
     // The guess is an argument that is overwritten.
-    let (suffix, passive) = if near {
-        ("_near", ", double *passive")
-    } else {
-        ("", "")
-    };
+    let (suffix, passive) = if near { ("_near", ", double *passive") } else { ("", "") };
     format!(
         "int {name}_{what}{suffix}(const {name}_{owner} *{owner}, {}{passive}, double *{result})",
         unit.state_parameters()

@@ -54,10 +54,7 @@ pub(crate) fn emit_sources(source: &EmissionRequest<'_>) -> Vec<EmittedFile> {
         path: format!("{}.{suffix}", unit.name),
         text,
     };
-    vec![
-        file("h", header::header(&unit)),
-        file("c", source::source(&unit)),
-    ]
+    vec![file("h", header::header(&unit)), file("c", source::source(&unit))]
 }
 
 /// All that header and source are printed from.
@@ -103,10 +100,7 @@ struct CFunction<'a> {
 }
 
 impl<'a> TranslationUnit<'a> {
-    #[allow(
-        clippy::too_many_lines,
-        reason = "a list of functions, one after the other"
-    )]
+    #[allow(clippy::too_many_lines, reason = "a list of functions, one after the other")]
     fn new(source: &'a EmissionRequest<'a>) -> Self {
         let derivation = source.derivation;
         let mechanism = &derivation.mechanism;
@@ -121,36 +115,29 @@ impl<'a> TranslationUnit<'a> {
         let (active, passive) = derivation.coordinates();
         let of_coordinate = |i: &usize| mechanism.coordinates[*i].name.clone();
         // A public function from a program, with names for its outputs.
-        let function =
-            |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
-                let routine = StatementRoutine::new(program, &scope, &outputs);
-                let follows = reads_passive(derivation, program);
-                CFunction {
-                    program,
-                    name,
-                    doc,
-                    result,
-                    routine,
-                    follows,
-                    is_public: true,
-                }
-            };
+        let function = |program: &'a StraightLineProgram, name, doc: String, result, outputs: Vec<String>| {
+            let routine = StatementRoutine::new(program, &scope, &outputs);
+            let follows = reads_passive(derivation, program);
+            CFunction {
+                program,
+                name,
+                doc,
+                result,
+                routine,
+                follows,
+                is_public: true,
+            }
+        };
         // Names such as `l_left` and `l_left_d`, one per drive.
         let each = |letter: &str, suffix: &str| -> Vec<String> {
             let drives = mechanism.drives.iter();
-            drives
-                .map(|d| format!("{letter}_{}{suffix}", d.name))
-                .collect()
+            drives.map(|d| format!("{letter}_{}{suffix}", d.name)).collect()
         };
         // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
         let mut of_motion = each("l", "");
         of_motion.extend(each("l", "_d"));
         for drive in &mechanism.drives {
-            of_motion.extend(
-                active
-                    .iter()
-                    .map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))),
-            );
+            of_motion.extend(active.iter().map(|a| format!("J_{}_{}", drive.name, of_coordinate(a))));
         }
         // Functions that every model has.
         let mut functions = vec![
@@ -171,8 +158,7 @@ impl<'a> TranslationUnit<'a> {
             function(
                 &programs.drives,
                 "drives",
-                "Lengths or angles of the drives, then their rates, then their Jacobian row by row"
-                    .to_owned(),
+                "Lengths or angles of the drives, then their rates, then their Jacobian row by row".to_owned(),
                 "motion",
                 of_motion,
             ),
@@ -210,16 +196,13 @@ impl<'a> TranslationUnit<'a> {
                 (
                     &dynamics.gravity,
                     "gravity",
-                    "g, generalised forces of gravity; rates and accelerations are not read"
-                        .to_owned(),
+                    "g, generalised forces of gravity; rates and accelerations are not read".to_owned(),
                     "forces",
                 ),
                 (
                     &dynamics.effects,
                     "effects",
-                    format!(
-                        "e, generalised forces of the effects at zero acceleration; {accelerations}"
-                    ),
+                    format!("e, generalised forces of the effects at zero acceleration; {accelerations}"),
                     "forces",
                 ),
                 (

@@ -54,12 +54,7 @@ typedef struct {{
     // Inputs of H: a state, followed by the passive coordinates if Newton's method solves for them.
     let n_active = unit.n_active();
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
-    let n_inputs = n_state
-        + if function.follows {
-            unit.n_passive()
-        } else {
-            0
-        };
+    let n_inputs = n_state + if function.follows { unit.n_passive() } else { 0 };
     // Declarations of the function's variables come first.
     let mut lines = vec![
         format!("{name}_all_columns all;"),
@@ -77,13 +72,9 @@ typedef struct {{
             "double all_triangle[{n_products} * {n_products}], few_triangle[{0} * {0}];",
             unit.n_base().max(1)
         ),
-        format!(
-            "double nominal[{n_active}], reach_of[{n_active}], unit_of[{n_active}], reach = 1.0;"
-        ),
+        format!("double nominal[{n_active}], reach_of[{n_active}], unit_of[{n_active}], reach = 1.0;"),
         "uint64_t draw = 2, random = 1;".to_owned(),
-        format!(
-            "int halving, k, i, d, found = 0, worst = 0; const int needed = 2 * {n_products} + 20;"
-        ),
+        format!("int halving, k, i, d, found = 0, worst = 0; const int needed = 2 * {n_products} + 20;"),
     ];
     // The scale is computed in a block of its own, because its names may repeat.
     if let Some(program) = &derivation.programs.scale {
@@ -124,11 +115,7 @@ typedef struct {{
         // A power is a repeated product.
         for (p, n) in &product.0 {
             for _ in 0..*n {
-                _ = write!(
-                    value,
-                    " * parameters.{}",
-                    c.name(&mechanism.parameters[*p].name)
-                );
+                _ = write!(value, " * parameters.{}", c.name(&mechanism.parameters[*p].name));
             }
         }
         lines.push(format!("products[{k}] = {value};"));
@@ -171,10 +158,7 @@ typedef struct {{
         String::new()
     };
     // The reach is halved when too few states had a solution.
-    _ = writeln!(
-        text,
-        "\nint {name}_self_test(const {name}_geometry *geometry)\n{{"
-    );
+    _ = writeln!(text, "\nint {name}_self_test(const {name}_geometry *geometry)\n{{");
     super::source::write_body(&lines, text);
     _ = writeln!(
         text,

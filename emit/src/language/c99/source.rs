@@ -96,9 +96,7 @@ fn has_call(unit: &TranslationUnit<'_>, what: &str) -> bool {
     for function in &unit.functions {
         c.statements(&function.routine.state, &mut lines);
     }
-    lines
-        .iter()
-        .any(|line| line.contains(&format!("{}{what}", unit.name)))
+    lines.iter().any(|line| line.contains(&format!("{}{what}", unit.name)))
 }
 
 impl TranslationUnit<'_> {
@@ -115,14 +113,8 @@ impl TranslationUnit<'_> {
 fn write_records(unit: &TranslationUnit<'_>, text: &mut String) {
     let (name, c) = (&unit.name, unit.syntax());
     let mechanism = &unit.source.derivation.mechanism;
-    let constants = mechanism
-        .constants
-        .iter()
-        .map(|x| (x.name.as_str(), x.value));
-    let parameters = mechanism
-        .parameters
-        .iter()
-        .map(|x| (x.name.as_str(), x.nominal));
+    let constants = mechanism.constants.iter().map(|x| (x.name.as_str(), x.value));
+    let parameters = mechanism.parameters.iter().map(|x| (x.name.as_str(), x.nominal));
     // A struct without fields has one that is not used, because C allows no empty struct.
     let mut record = |function: &str, of: &str, values: Vec<(&str, f64)>| {
         _ = writeln!(text, "\nvoid {name}_{function}({name}_{of} *{of})\n{{");
@@ -242,11 +234,7 @@ pub(super) fn write_program(
     );
     let mut lines = Vec::new();
     // Reactions contain a prepared model; its geometry is one level deeper.
-    let within = if owner == "reactions" {
-        "dynamics."
-    } else {
-        ""
-    };
+    let within = if owner == "reactions" { "dynamics." } else { "" };
     parameter_bindings(
         unit,
         &routine.read,
@@ -265,11 +253,7 @@ pub(super) fn write_program(
     let derivation = unit.source.derivation;
     let inputs = if function.name == "gaps" || function.name == "scales" {
         let (active, passive) = derivation.coordinates();
-        active
-            .into_iter()
-            .chain(passive)
-            .map(Atom::Coordinate)
-            .collect()
+        active.into_iter().chain(passive).map(Atom::Coordinate).collect()
     } else {
         inputs_of_state(derivation, function.follows)
     };
@@ -381,21 +365,11 @@ fn write_state_inputs(unit: &TranslationUnit<'_>, text: &mut String) {
 }
 
 /// A public function, and a second one with a guess if it follows the loops.
-fn write_public_function(
-    unit: &TranslationUnit<'_>,
-    function: &CFunction<'_>,
-    owner: &str,
-    text: &mut String,
-) {
+fn write_public_function(unit: &TranslationUnit<'_>, function: &CFunction<'_>, owner: &str, text: &mut String) {
     let TranslationUnit { name, upper, .. } = unit;
     let n_state: usize = unit.state_parts().iter().map(|(_, n)| n).sum();
     // The state, and passive coordinates behind it.
-    let n_inputs = n_state
-        + if function.follows {
-            unit.n_passive()
-        } else {
-            0
-        };
+    let n_inputs = n_state + if function.follows { unit.n_passive() } else { 0 };
     // Length of the result.
     let n_outputs = function.routine.n_outputs;
     // The prepared model inside the struct.
@@ -412,11 +386,7 @@ fn write_public_function(
     };
     // A program that can fail writes to a local array first, so that results change only if the status is OK.
     let can_fail = function.routine.can_fail();
-    let ways: &[bool] = if function.follows {
-        &[false, true]
-    } else {
-        &[false]
-    };
+    let ways: &[bool] = if function.follows { &[false, true] } else { &[false] };
     // The statements of both forms differ in how the passive coordinates are found.
     for near in ways {
         let mut lines = vec![
@@ -443,7 +413,9 @@ fn write_public_function(
                 "if (status == {upper}_OK) status = {name}_passive_position({model}, q, inputs + {n_state});"
             )),
             (true, true) => {
-                lines.push(format!("for (i = 0; i < {upper}_N_PASSIVE; i++) found[i] = passive[i];"));
+                lines.push(format!(
+                    "for (i = 0; i < {upper}_N_PASSIVE; i++) found[i] = passive[i];"
+                ));
                 lines.push(format!(
                     "if (status == {upper}_OK) status = {name}_passive_position_near({model}, q, found);"
                 ));
@@ -485,11 +457,7 @@ fn write_bias(unit: &TranslationUnit<'_>, text: &mut String) {
     let arguments = unit.state_arguments();
     // With and without a guess.
     for near in super::header::bias_variants(unit) {
-        let (suffix, passive) = if *near {
-            ("_near", ", passive")
-        } else {
-            ("", "")
-        };
+        let (suffix, passive) = if *near { ("_near", ", passive") } else { ("", "") };
         _ = writeln!(
             text,
             "
@@ -565,9 +533,7 @@ int {name}_prepare_reactions({name}_reactions *reactions, const {name}_geometry 
     lines.push(format!(
         "if ({name}_base_parameters(geometry, parameters, base) != {upper}_OK)\n        return self->dynamics.input = {upper}_SPECIAL;"
     ));
-    lines.push(format!(
-        "(void){name}_prepare(&self->dynamics, geometry, base);"
-    ));
+    lines.push(format!("(void){name}_prepare(&self->dynamics, geometry, base);"));
     lines.push("self->parameters = *parameters;".to_owned());
     // Checks of all parameters.
     for parameter in &unit.source.derivation.mechanism.parameters {

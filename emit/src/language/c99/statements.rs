@@ -210,22 +210,15 @@ impl CSyntax<'_> {
             }
             // Sines and cosines of all angles of a program are computed together.
             CodeStatement::Angles(angles) => {
-                let mut values: Vec<String> =
-                    angles.iter().map(|a| self.operand_text(&a.value)).collect();
+                let mut values: Vec<String> = angles.iter().map(|a| self.operand_text(&a.value)).collect();
                 // They are computed in pairs, so the last angle of an odd number is repeated.
                 if values.len() % 2 == 1 {
                     values.extend(values.last().cloned());
                 }
                 let n = values.len();
                 lines.push(format!("double sines[{n}], cosines[{n}];"));
-                lines.push(format!(
-                    "const double angles[{n}] = {{{}}};",
-                    values.join(", ")
-                ));
-                lines.push(format!(
-                    "{}_sin_cos_all({n}, angles, sines, cosines);",
-                    self.name
-                ));
+                lines.push(format!("const double angles[{n}] = {{{}}};", values.join(", ")));
+                lines.push(format!("{}_sin_cos_all({n}, angles, sines, cosines);", self.name));
             }
             CodeStatement::SinCos {
                 sine,
@@ -248,11 +241,10 @@ impl CSyntax<'_> {
             } => {
                 // A single angle; the number of the line makes the name of an unused value unique.
                 let place = lines.len();
-                let [sine, cosine] =
-                    [(sine, "s"), (cosine, "c")].map(|(name, letter)| match name {
-                        Some(name) => self.name(name),
-                        None => format!("unused_{letter}{place}"),
-                    });
+                let [sine, cosine] = [(sine, "s"), (cosine, "c")].map(|(name, letter)| match name {
+                    Some(name) => self.name(name),
+                    None => format!("unused_{letter}{place}"),
+                });
                 lines.push(format!("double {sine}, {cosine};"));
                 lines.push(format!(
                     "{}_sin_cos({}, &{sine}, &{cosine});",

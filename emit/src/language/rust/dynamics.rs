@@ -7,29 +7,19 @@ use quote::quote;
 
 use super::items::operation_count;
 use super::program::{
-    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
-    ResultConversion,
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct, ResultConversion,
 };
 use crate::tree::{NameScope, reads_passive};
 
 /// The struct `Dynamics` for one geometry and one set of base parameters.
-pub(super) fn dynamics(
-    derivation: &Derivation,
-    scope: &NameScope,
-    dynamics: &DynamicsPrograms,
-) -> TokenStream {
+pub(super) fn dynamics(derivation: &Derivation, scope: &NameScope, dynamics: &DynamicsPrograms) -> TokenStream {
     let (active, _) = derivation.coordinates();
     let names = active
         .iter()
         .map(|i| derivation.mechanism.coordinates[*i].name.as_str());
     let names: Vec<&str> = names.collect();
     // Names of outputs: one per coordinate, with a letter in front.
-    let of_each = |letter: &str| -> Vec<String> {
-        names
-            .iter()
-            .map(|name| format!("{letter}_{name}"))
-            .collect()
-    };
+    let of_each = |letter: &str| -> Vec<String> { names.iter().map(|name| format!("{letter}_{name}")).collect() };
     // Entries of the mass matrix, row by row.
     let entries = names
         .iter()
@@ -82,22 +72,20 @@ pub(super) fn dynamics(
         ),
     ];
     // The methods with their numbers of operations.
-    let functions = functions.map(
-        |([name, item], program, doc, outputs, output)| ProgramMethod {
-            program,
-            name,
-            item,
-            doc: format!("{doc} {}.", operation_count(program)),
-            inputs: ProgramStateInputs::Motion,
-            outputs,
-            output: Some(output),
-            // The Jacobian follows the bias in the outputs of the program; the method returns only the bias.
-            results: (name == "bias").then(|| ResultConversion {
-                from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
-                conversion: quote! { found.values },
-            }),
-        },
-    );
+    let functions = functions.map(|([name, item], program, doc, outputs, output)| ProgramMethod {
+        program,
+        name,
+        item,
+        doc: format!("{doc} {}.", operation_count(program)),
+        inputs: ProgramStateInputs::Motion,
+        outputs,
+        output: Some(output),
+        // The Jacobian follows the bias in the outputs of the program; the method returns only the bias.
+        results: (name == "bias").then(|| ResultConversion {
+            from_type: quote! { Linearisation<T, N_ACTIVE, N_DRIVES> },
+            conversion: quote! { found.values },
+        }),
+    });
     ProgramStruct {
         derivation,
         scope,

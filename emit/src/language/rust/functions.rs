@@ -7,9 +7,7 @@ use quote::quote;
 
 use super::items::operation_count;
 use super::newton::newton;
-use super::program::{
-    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
-};
+use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct};
 use crate::tree::{NameScope, reads_passive};
 
 /// The struct `Model`: all programs that need only the geometry.
@@ -35,19 +33,13 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     // Names of the outputs: `l_left`, `l_left_d`, one per drive.
     let of_drives = |letter: &str, suffix: &str| -> Vec<String> {
         let drives = mechanism.drives.iter();
-        drives
-            .map(|d| format!("{letter}_{}{suffix}", d.name))
-            .collect()
+        drives.map(|d| format!("{letter}_{}{suffix}", d.name)).collect()
     };
     // Lengths, rates, then the Jacobian row by row: the order of the program's outputs.
     let mut of_motion = of_drives("l", "");
     of_motion.extend(of_drives("l", "_d"));
     for drive in &mechanism.drives {
-        of_motion.extend(
-            active
-                .iter()
-                .map(|a| format!("J_{}_{}", drive.name, name(a))),
-        );
+        of_motion.extend(active.iter().map(|a| format!("J_{}_{}", drive.name, name(a))));
     }
     // Kinematics of the drives.
     let drives = ProgramMethod {
@@ -71,9 +63,7 @@ pub(super) fn model(derivation: &Derivation, scope: &NameScope) -> TokenStream {
             item: "MotionOfPassive",
             doc: "Passive coordinates with their rates and accelerations.".to_owned(),
             inputs: ProgramStateInputs::Motion,
-            outputs: motion
-                .map(|(p, suffix)| format!("{}{suffix}", name(p)))
-                .collect(),
+            outputs: motion.map(|(p, suffix)| format!("{}{suffix}", name(p))).collect(),
             output: Some(quote! { Passive<T> }),
             results: None,
         });
@@ -131,10 +121,7 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
         program,
         name: "forces",
         item: "Forces",
-        doc: format!(
-            "Forces of the drives, N or N m. {}.",
-            operation_count(program)
-        ),
+        doc: format!("Forces of the drives, N or N m. {}.", operation_count(program)),
         inputs: ProgramStateInputs::Motion,
         outputs: drives.map(|d| format!("f_{}", d.name)).collect(),
         output: Some(quote! { [T; N_DRIVES] }),
@@ -167,8 +154,5 @@ pub(super) fn inverse_dynamics(derivation: &Derivation, scope: &NameScope) -> To
 
 /// Whether the passive coordinates are solved for by Newton's method.
 pub(super) fn is_newton(derivation: &Derivation) -> bool {
-    matches!(
-        derivation.programs.passive_position,
-        PassivePosition::Newton(_)
-    )
+    matches!(derivation.programs.passive_position, PassivePosition::Newton(_))
 }

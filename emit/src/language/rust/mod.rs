@@ -132,7 +132,7 @@ pub(crate) fn doc_lines(doc: &str, inner: bool) -> TokenStream {
 
 /// The source text of tokens that form a file.
 pub(crate) fn print_source(tokens: &TokenStream) -> String {
-    let file = syn::parse2(tokens.clone())
-        .unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
+    let file =
+        syn::parse2(tokens.clone()).unwrap_or_else(|error| panic!("emitted tokens do not parse: {error}\n{tokens}"));
     statements::restore_lines(&prettyplease::unparse(&file))
 }

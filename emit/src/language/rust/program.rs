@@ -16,8 +16,7 @@ use super::statements::{RustSyntax, fill_lines, line_tokens, statements, verbati
 use crate::identifier::field_identifier;
 use crate::language::syntax::LanguageSyntax;
 use crate::tree::{
-    CodeStatement, NameScope, PrecomputedValues, SharedPose, StatementRoutine, inputs_of_state,
-    reads_passive,
+    CodeStatement, NameScope, PrecomputedValues, SharedPose, StatementRoutine, inputs_of_state, reads_passive,
 };
 
 /// What a struct is prepared from.
@@ -142,15 +141,12 @@ impl ProgramStruct<'_> {
             let mut routine = StatementRoutine::new(program, self.scope, &function.outputs);
             once.absorb(&mut routine);
             let pose = pose.filter(|_| rest.is_some());
-            routine
-                .read
-                .extend(pose.iter().flat_map(|pose| &pose.inputs));
+            routine.read.extend(pose.iter().flat_map(|pose| &pose.inputs));
             routines.push((routine, pose));
         }
         let name = format_ident!("{}", self.name);
         // A field exists only if a program reads it.
-        let reads =
-            |wanted: fn(&Atom) -> bool| routines.iter().any(|(r, _)| r.read.iter().any(wanted));
+        let reads = |wanted: fn(&Atom) -> bool| routines.iter().any(|(r, _)| r.read.iter().any(wanted));
         // Whether any program shares the pose.
         let has_pose = routines.iter().any(|(_, pose)| pose.is_some());
         let pose_field = has_pose.then(|| quote! { pose: Pose<T>, });
@@ -164,19 +160,11 @@ impl ProgramStruct<'_> {
         let physical_field = physical.then(|| quote! { parameters: Parameters<T>, });
         let physical_init = physical.then(|| quote! { parameters: *parameters, });
         // Other structs than `Model` contain one to solve for the passive coordinates.
-        let newton = self.name != "Model"
-            && self
-                .functions
-                .iter()
-                .any(|f| reads_passive(self.derivation, f.program));
+        let newton = self.name != "Model" && self.functions.iter().any(|f| reads_passive(self.derivation, f.program));
         let model_field = newton.then(|| quote! { model: Model<T>, });
         let model_init = newton.then(|| quote! { model: Model::new(geometry), });
         // Precomputed values are an array, whose entries programs bind to their names.
-        let kept: Vec<Ident> = once
-            .kept
-            .iter()
-            .map(|name| field_identifier(name))
-            .collect();
+        let kept: Vec<Ident> = once.kept.iter().map(|name| field_identifier(name)).collect();
         let n_kept = Literal::usize_unsuffixed(kept.len());
         let has_once = !kept.is_empty();
         let once_field = has_once.then(|| {
@@ -192,10 +180,7 @@ impl ProgramStruct<'_> {
             quote! { let n = &ScalarNumbers::<T>::new(); #given #statements }
         });
         let once_init = has_once.then(|| quote! { once: values![#(#kept),*], });
-        let (parameters, prepares) = (
-            self.preparation.parameter_tokens(),
-            format!(" {}", self.prepares),
-        );
+        let (parameters, prepares) = (self.preparation.parameter_tokens(), format!(" {}", self.prepares));
         // Invalid inputs are stored, and reported by every method.
         let check = self.preparation.check_tokens();
         let ExtraItems {
@@ -402,14 +387,9 @@ impl ProgramStruct<'_> {
     }
 
     /// Patterns for the inputs, `_` for those that are not read, and the table with their names.
-    fn inputs(
-        &self,
-        function: &ProgramMethod<'_>,
-        routine: &StatementRoutine,
-    ) -> (Vec<TokenStream>, TokenStream) {
+    fn inputs(&self, function: &ProgramMethod<'_>, routine: &StatementRoutine) -> (Vec<TokenStream>, TokenStream) {
         // Whether the inputs contain passive coordinates.
-        let newton = function.inputs == ProgramStateInputs::Motion
-            && reads_passive(self.derivation, function.program);
+        let newton = function.inputs == ProgramStateInputs::Motion && reads_passive(self.derivation, function.program);
         let atoms = match function.inputs {
             ProgramStateInputs::Motion => inputs_of_state(self.derivation, newton),
             ProgramStateInputs::Pose => {
@@ -460,21 +440,11 @@ pub(super) fn parameter_bindings(
     base: &str,
 ) -> TokenStream {
     let mechanism = &derivation.mechanism;
-    let constants: Vec<&str> = mechanism
-        .constants
-        .iter()
-        .map(|c| c.name.as_str())
-        .collect();
-    let physical: Vec<&str> = mechanism
-        .parameters
-        .iter()
-        .map(|p| p.name.as_str())
-        .collect();
+    let constants: Vec<&str> = mechanism.constants.iter().map(|c| c.name.as_str()).collect();
+    let physical: Vec<&str> = mechanism.parameters.iter().map(|p| p.name.as_str()).collect();
     // One pattern per record, with the fields that are read.
     let record = |record: &str, names: &[&str], atom: fn(usize) -> Atom, from: &TokenStream| {
-        let wanted: Vec<usize> = (0..names.len())
-            .filter(|i| read.contains(&atom(*i)))
-            .collect();
+        let wanted: Vec<usize> = (0..names.len()).filter(|i| read.contains(&atom(*i))).collect();
         if wanted.is_empty() {
             return TokenStream::new();
         }
@@ -525,10 +495,7 @@ fn precomputed_bindings(once: &PrecomputedValues, routine: &StatementRoutine) ->
     let places = once.kept.iter().enumerate();
     // Positions in the array of precomputed values.
     let read = places.filter(|(_, name)| routine.kept.contains(name));
-    array_bindings(
-        read.map(|(k, name)| (field_identifier(name), k)),
-        "self.once",
-    )
+    array_bindings(read.map(|(k, name)| (field_identifier(name), k)), "self.once")
 }
 
 /// The struct `Pose` with the values that several programs share: loop closure and drive lengths. Nothing if they share
@@ -547,14 +514,9 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
         "",
     );
     let written_once = statements(&pose.once.statements());
-    let begin = (!pose.once.kept.is_empty())
-        .then(|| quote! { let n = &ScalarNumbers::<T>::new(); #given_once #written_once });
-    let names: Vec<Ident> = pose
-        .once
-        .kept
-        .iter()
-        .map(|name| field_identifier(name))
-        .collect();
+    let begin =
+        (!pose.once.kept.is_empty()).then(|| quote! { let n = &ScalarNumbers::<T>::new(); #given_once #written_once });
+    let names: Vec<Ident> = pose.once.kept.iter().map(|name| field_identifier(name)).collect();
     let n_kept = Literal::usize_unsuffixed(names.len());
     let read = parameter_bindings(
         derivation,
@@ -577,8 +539,7 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
     // The pose returns its results, so it stores no outputs.
     let state = state.filter(|statement| !matches!(statement, CodeStatement::Put { .. }));
     let state = statements(&state.cloned().collect::<Vec<CodeStatement>>());
-    let results =
-        (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
+    let results = (0..pose.routine.results.len()).map(|k| RustSyntax.name(scope.input_name(Atom::Shared(k))));
     let results = verbatim_tokens(&fill_lines("Ok(variables![", results, "])").join("\n"));
     quote! {
         /// Pose-dependent quantities (loop closure, drive lengths) shared by all functions.
@@ -611,21 +572,14 @@ pub(super) fn pose(derivation: &Derivation, scope: &NameScope) -> TokenStream {
 }
 
 /// The value of a program without inputs of a state, as an expression with `geometry` in scope.
-pub(super) fn single_value(
-    derivation: &Derivation,
-    scope: &NameScope,
-    program: &StraightLineProgram,
-) -> TokenStream {
+pub(super) fn single_value(derivation: &Derivation, scope: &NameScope, program: &StraightLineProgram) -> TokenStream {
     let routine = StatementRoutine::new(program, scope, &[]);
     let (geometry, nothing) = (quote! { geometry }, TokenStream::new());
     let read: BTreeSet<Atom> = routine.read_once.union(&routine.read).copied().collect();
     let given = parameter_bindings(derivation, scope, &read, &geometry, &nothing, "");
     let once = statements(&routine.once);
     // The program has one output.
-    let result = routine
-        .results
-        .first()
-        .map(|result| RustSyntax.operand_text(result));
+    let result = routine.results.first().map(|result| RustSyntax.operand_text(result));
     let result: TokenStream = result.unwrap_or_default().parse().unwrap_or_default();
     quote! { { let n = &ScalarNumbers::<T>::new(); #given #once (#result).get() } }
 }

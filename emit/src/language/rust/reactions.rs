@@ -6,17 +6,12 @@ use quote::quote;
 
 use super::items::operation_count;
 use super::program::{
-    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
-    ResultConversion,
+    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct, ResultConversion,
 };
 use crate::tree::NameScope;
 
 /// The struct `Reactions`, its result type and its tables of joints and loops.
-pub(super) fn reactions(
-    derivation: &Derivation,
-    scope: &NameScope,
-    reactions: &ReactionPrograms,
-) -> TokenStream {
+pub(super) fn reactions(derivation: &Derivation, scope: &NameScope, reactions: &ReactionPrograms) -> TokenStream {
     let program = &reactions.program;
     // Components of a vector; those that are not determined are `None`.
     let three = |places: &[Option<usize>; 3]| {

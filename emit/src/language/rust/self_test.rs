@@ -6,9 +6,7 @@ use proc_macro2::{Literal, TokenStream};
 use quote::quote;
 
 use super::items::{loop_scale, nominal_values};
-use super::program::{
-    ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct,
-};
+use super::program::{ExtraItems, PreparationInputs, ProgramMethod, ProgramStateInputs, ProgramStruct};
 use crate::identifier::field_identifier;
 use crate::tree::{NameScope, uses_load};
 
@@ -45,11 +43,7 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     };
     let owner = owner.tokens();
     // Names of the parameters in the struct.
-    let fields: Vec<_> = mechanism
-        .parameters
-        .iter()
-        .map(|p| field_identifier(&p.name))
-        .collect();
+    let fields: Vec<_> = mechanism.parameters.iter().map(|p| field_identifier(&p.name)).collect();
     // Values of the products p_g.
     let values = products.iter().map(|product| {
         let powers = product.0.iter();
@@ -67,26 +61,18 @@ pub(super) fn self_test(derivation: &Derivation, scope: &NameScope) -> TokenStre
     // Range of each coordinate around its nominal value.
     let self_test_reach = derivation.self_test_reaches();
     let reach = active.iter().zip(self_test_reach).map(|(i, reach)| {
-        let scale = scaled
-            .as_ref()
-            .filter(|_| mechanism.coordinates[*i].motion.is_length());
-        let (scaled, reach) = (
-            scale.map(|s| quote! { #s * }),
-            Literal::f64_unsuffixed(reach),
-        );
+        let scale = scaled.as_ref().filter(|_| mechanism.coordinates[*i].motion.is_length());
+        let (scaled, reach) = (scale.map(|s| quote! { #s * }), Literal::f64_unsuffixed(reach));
         quote! { #scaled #reach }
     });
     // Rates of lengths are scaled too, so that the columns of a small machine keep comparable sizes.
     let units = active.iter().map(|i| {
-        let scale = scaled
-            .as_ref()
-            .filter(|_| mechanism.coordinates[*i].motion.is_length());
+        let scale = scaled.as_ref().filter(|_| mechanism.coordinates[*i].motion.is_length());
         scale.cloned().unwrap_or_else(|| quote! { 1.0 })
     });
     let scale = scale.map(|scale| quote! { let scale = #scale; });
     // Random loads if an effect depends on them.
-    let load = uses_load(derivation)
-        .then(|| quote! { load: ::core::array::from_fn(|_| random.uniform(-50.0, 50.0)), });
+    let load = uses_load(derivation).then(|| quote! { load: ::core::array::from_fn(|_| random.uniform(-50.0, 50.0)), });
     quote! {
         /// Number of products of parameters.
         pub const N_PRODUCTS: usize = #n_products;

@@ -69,21 +69,13 @@ pub(super) fn line_tokens(written: &[String]) -> TokenStream {
 }
 
 /// The items of a list between `start` and `end`, filled into lines.
-pub(super) fn fill_lines(
-    start: &str,
-    items: impl Iterator<Item = String>,
-    end: &str,
-) -> Vec<String> {
+pub(super) fn fill_lines(start: &str, items: impl Iterator<Item = String>, end: &str) -> Vec<String> {
     let mut lines = vec![start.to_owned()];
     let mut items = items.peekable();
     while let Some(mut item) = items.next() {
         item.push_str(if items.peek().is_some() { "," } else { end });
         // The first item follows `start` without a blank.
-        let space = if lines.len() == 1 && lines[0] == start {
-            ""
-        } else {
-            " "
-        };
+        let space = if lines.len() == 1 && lines[0] == start { "" } else { " " };
         match lines.last_mut() {
             Some(line) if line.len() + space.len() + item.len() <= WIDTH => {
                 line.push_str(space);
@@ -150,9 +142,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
         // Headings become comments.
         CodeStatement::Section(text) => line(format!("// {text}")),
         CodeStatement::Let { name, value, note } => {
-            let note = note
-                .as_ref()
-                .map_or(String::new(), |note| format!(" // {note}"));
+            let note = note.as_ref().map_or(String::new(), |note| format!(" // {note}"));
             line(format!(
                 "let {} = {};{note}",
                 RustSyntax.name(name),
@@ -164,11 +154,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             // The list takes variables; an expression is made one first.
             let values = angles.iter().map(|angle| {
                 let value = RustSyntax.operand_text(&angle.value);
-                if angle.plain {
-                    value
-                } else {
-                    format!("({value}).var()")
-                }
+                if angle.plain { value } else { format!("({value}).var()") }
             });
             let mut values: Vec<String> = values.collect();
             // The compiler pairs the lanes only if the number of angles is even, so the last one is repeated.
@@ -209,10 +195,7 @@ fn write(statement: &CodeStatement, depth: usize, lines: &mut Vec<String>) {
             PoseCheck::Finite(value) => format!("n.finite({})?;", RustSyntax.operand_text(value)),
         }),
         CodeStatement::Put { output, value } => {
-            line(format!(
-                "n.put({output}, {});",
-                RustSyntax.operand_text(value)
-            ));
+            line(format!("n.put({output}, {});", RustSyntax.operand_text(value)));
         }
         // A block, which returns the values that later statements read.
         CodeStatement::Group {

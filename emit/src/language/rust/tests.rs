@@ -28,16 +28,9 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             let [own, pose] = [&format!("{method}_program"), "at"].map(|m| recount(&file, m));
             let recount = (own.0 + pose.0, own.1 + pose.1, own.2 + pose.2);
             let count = program.count_operations(ProgramStage::State);
-            assert_eq!(
-                recount,
-                (count.add, count.mul, count.div),
-                "{method} of {model}"
-            );
+            assert_eq!(recount, (count.add, count.mul, count.div), "{method} of {model}");
         }
-        for program in [
-            &derivation.programs.regressor,
-            &derivation.programs.inverse_dynamics,
-        ] {
+        for program in [&derivation.programs.regressor, &derivation.programs.inverse_dynamics] {
             assert_eq!(program.ops.len(), program.stages.len());
             let numbers = program
                 .ops
@@ -52,13 +45,10 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
 /// Additions with subtractions, multiplications and divisions in a method of the source.
 fn recount(file: &syn::File, method: &str) -> (usize, usize, usize) {
     let mut count = (0, 0, 0);
-    let methods = file.items.iter().filter_map(|item| {
-        if let syn::Item::Impl(i) = item {
-            Some(i)
-        } else {
-            None
-        }
-    });
+    let methods = file
+        .items
+        .iter()
+        .filter_map(|item| if let syn::Item::Impl(i) = item { Some(i) } else { None });
     for item in methods.flat_map(|i| &i.items) {
         if let syn::ImplItem::Fn(function) = item
             && function.sig.ident == method

@@ -55,9 +55,7 @@ fn force_unit(is_angle: bool) -> LawUnit {
 /// Unit of a variable of a place or of another place.
 fn unit_of(variable: LawVariable, own_is_angle: bool, other_is_angle: bool) -> LawUnit {
     // m or rad, divided by a power of s.
-    let along = |is_angle: bool, over_time: i32| {
-        LawUnit([0, i32::from(!is_angle), i32::from(is_angle), -over_time])
-    };
+    let along = |is_angle: bool, over_time: i32| LawUnit([0, i32::from(!is_angle), i32::from(is_angle), -over_time]);
     match variable {
         LawVariable::Position => along(own_is_angle, 0),
         LawVariable::Rate => along(own_is_angle, 1),
@@ -74,13 +72,10 @@ impl LawProduct {
         // Whether the other place is revolute.
         let other = self.other.is_some_and(|other| sites[other].is_angle);
         // Start from the unit of the force and divide by that of every factor.
-        let unit = self
-            .factors
-            .iter()
-            .fold(force_unit(site.is_angle), |unit, factor| {
-                let variable = unit_of(factor.variable, site.is_angle, other);
-                unit.divide_by(variable, factor.shape.unit_exponent())
-            });
+        let unit = self.factors.iter().fold(force_unit(site.is_angle), |unit, factor| {
+            let variable = unit_of(factor.variable, site.is_angle, other);
+            unit.divide_by(variable, factor.shape.unit_exponent())
+        });
         unit.format_unit()
     }
 }
@@ -125,32 +120,19 @@ mod tests {
             unit(1, None, &[(Rate, LawShape::integer_power(2, true))]),
             "N m s^2/rad^2"
         );
+        assert_eq!(unit(0, None, &[(Load, LawShape::integer_power(2, false))]), "1/N");
         assert_eq!(
-            unit(0, None, &[(Load, LawShape::integer_power(2, false))]),
-            "1/N"
-        );
-        assert_eq!(
-            unit(
-                1,
-                None,
-                &[(Load, LawShape::MAGNITUDE), (Rate, LawShape::SIGN)]
-            ),
+            unit(1, None, &[(Load, LawShape::MAGNITUDE), (Rate, LawShape::SIGN)]),
             "1"
         );
         assert_eq!(
             unit(
                 1,
                 None,
-                &[
-                    (Position, LawShape::LINEAR),
-                    (Acceleration, LawShape::LINEAR)
-                ]
+                &[(Position, LawShape::LINEAR), (Acceleration, LawShape::LINEAR)]
             ),
             "N m s^2/rad^2"
         );
-        assert_eq!(
-            unit(0, None, &[(Position, LawShape::integer_power(3, true))]),
-            "N/m^3"
-        );
+        assert_eq!(unit(0, None, &[(Position, LawShape::integer_power(3, true))]), "N/m^3");
     }
 }

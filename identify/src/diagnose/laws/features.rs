@@ -56,8 +56,7 @@ impl LawProduct {
     pub(crate) fn description_length(&self) -> usize {
         // A plain integer power counts one less than other shapes.
         let of = |factor: &LawFactor| {
-            let is_plain =
-                matches!(factor.shape, LawShape::Power { halves, .. } if halves % 2 == 0);
+            let is_plain = matches!(factor.shape, LawShape::Power { halves, .. } if halves % 2 == 0);
             1 + factor.shape.freedoms() + usize::from(!is_plain)
         };
         self.factors.iter().map(of).sum::<usize>() + usize::from(self.other.is_some())
@@ -88,16 +87,13 @@ impl LawProduct {
                 {
                     true
                 }
-                (LawVariable::Rate, shape)
-                    if [LawShape::SIGN, LawShape::integer_power(2, true)].contains(shape) =>
-                {
+                (LawVariable::Rate, shape) if [LawShape::SIGN, LawShape::integer_power(2, true)].contains(shape) => {
                     true
                 }
                 (LawVariable::Rate, LawShape::Fading { halves: 4, .. }) => true,
-                (
-                    LawVariable::Position,
-                    LawShape::Wave { .. } | LawShape::Memory { curve: 1, .. },
-                ) => site.channel.is_some(),
+                (LawVariable::Position, LawShape::Wave { .. } | LawShape::Memory { curve: 1, .. }) => {
+                    site.channel.is_some()
+                }
                 _ => false,
             },
             [load, way] => {
@@ -139,9 +135,7 @@ pub(crate) struct FactorCatalog {
 /// Least and largest value of a series.
 pub(crate) fn range(z: &[f64]) -> [f64; 2] {
     z.iter()
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
-            [a.min(*z), b.max(*z)]
-        })
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| [a.min(*z), b.max(*z)])
 }
 
 /// Root mean square of a series.
@@ -157,11 +151,7 @@ fn factors_of(variable: LawVariable, shapes: impl IntoIterator<Item = LawShape>)
 
 /// A power with the exponent `halves / 2`.
 fn half_power(halves: i32, is_odd: bool, scale: f64) -> LawShape {
-    LawShape::Power {
-        halves,
-        is_odd,
-        scale,
-    }
+    LawShape::Power { halves, is_odd, scale }
 }
 
 /// Range and largest rate of a place, from which the constants of shapes are chosen.
@@ -202,10 +192,7 @@ impl TravelExtent {
     fn hinge_shapes(&self, power: i32) -> impl Iterator<Item = LawShape> {
         ENDS.into_iter().flat_map(move |part| {
             // A hinge near the upper end acts upwards, one near the lower end downwards.
-            let ends = [
-                (1.0, self.position_at(1.0 - part)),
-                (-1.0, self.position_at(part)),
-            ];
+            let ends = [(1.0, self.position_at(1.0 - part)), (-1.0, self.position_at(part))];
             ends.map(|(side, from)| LawShape::Hinge { from, side, power })
         })
     }
@@ -225,9 +212,9 @@ impl TravelExtent {
 
     /// Local shapes of some widths along the travel.
     fn local_shapes(&self, make: fn(f64, f64) -> LawShape, widths: &[f64]) -> Vec<LawShape> {
-        let each = widths.iter().flat_map(|width| {
-            CENTRES.map(move |centre| make(self.position_at(centre), width * self.travel))
-        });
+        let each = widths
+            .iter()
+            .flat_map(|width| CENTRES.map(move |centre| make(self.position_at(centre), width * self.travel)));
         each.collect()
     }
 
@@ -313,10 +300,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
     alone.extend(factors_of(Position, extent.wave_shapes()));
     alone.extend(factors_of(Position, extent.local_shapes(bump, &WIDTHS)));
     alone.extend(factors_of(Position, extent.local_shapes(detent, &WIDTHS)));
-    alone.extend(factors_of(
-        Position,
-        extent.local_shapes(step, &WIDTHS[..1]),
-    ));
+    alone.extend(factors_of(Position, extent.local_shapes(step, &WIDTHS[..1])));
     alone.extend(factors_of(Position, extent.memory_shapes()));
     // Functions of the rate: friction and damping.
     let speeds = [
@@ -343,10 +327,7 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
         let slow = SCALES.map(|part| make(0.0, part * extent.fastest));
         alone.extend(factors_of(Rate, slow));
     }
-    alone.extend(factors_of(
-        Acceleration,
-        [LawShape::LINEAR, LawShape::MAGNITUDE],
-    ));
+    alone.extend(factors_of(Acceleration, [LawShape::LINEAR, LawShape::MAGNITUDE]));
     // Friction, damping and mass that depend on the position.
     let ways = [
         LawShape::LINEAR,
@@ -358,21 +339,14 @@ pub(crate) fn own_factors(position: &[f64], rate: &[f64], load: Option<&[f64]>) 
     ];
     // Functions of the position by which these are multiplied.
     let some = [LawShape::LINEAR, LawShape::integer_power(2, false)].into_iter();
-    let some = some
-        .chain(extent.shifted_powers(2))
-        .chain(extent.hinge_shapes(1));
+    let some = some.chain(extent.shifted_powers(2)).chain(extent.hinge_shapes(1));
     let some = some.chain(extent.local_shapes(bump, &WIDTHS[1..]));
-    menu.pairs
-        .push([factors_of(Position, some), factors_of(Rate, ways)]);
+    menu.pairs.push([factors_of(Position, some), factors_of(Rate, ways)]);
     let few = [LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
-    menu.pairs.push([
-        factors_of(Position, extent.wave_shapes()),
-        factors_of(Rate, few),
-    ]);
-    menu.pairs.push([
-        simple_positions(),
-        factors_of(Acceleration, [LawShape::LINEAR]),
-    ]);
+    menu.pairs
+        .push([factors_of(Position, extent.wave_shapes()), factors_of(Rate, few)]);
+    menu.pairs
+        .push([simple_positions(), factors_of(Acceleration, [LawShape::LINEAR])]);
     // The load is known for drives only.
     if let Some(load) = load {
         add_loads(&mut menu, &extent, load);
@@ -408,28 +382,19 @@ fn add_loads(menu: &mut FactorCatalog, extent: &TravelExtent, load: &[f64]) {
             power: 1,
         })
     });
-    menu.single_factors
-        .extend(factors_of(Load, loads.iter().copied()));
+    menu.single_factors.extend(factors_of(Load, loads.iter().copied()));
     menu.single_factors.extend(factors_of(Load, cut));
     // Load-dependent friction of all kinds.
     let mut speeds = vec![LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
     speeds.extend(extent.step_shapes());
     speeds.extend(extent.fading_shapes(4));
-    menu.pairs.push([
-        factors_of(Load, loads.iter().copied()),
-        factors_of(Rate, speeds),
-    ]);
     menu.pairs
-        .push([factors_of(Load, loads), simple_positions()]);
+        .push([factors_of(Load, loads.iter().copied()), factors_of(Rate, speeds)]);
+    menu.pairs.push([factors_of(Load, loads), simple_positions()]);
 }
 
 /// Factors that are tried for the motion of another place, alone and multiplied by the own motion.
-pub(crate) fn factors_with_other(
-    own_rate: &[f64],
-    position: &[f64],
-    rate: &[f64],
-    is_angle: bool,
-) -> FactorCatalog {
+pub(crate) fn factors_with_other(own_rate: &[f64], position: &[f64], rate: &[f64], is_angle: bool) -> FactorCatalog {
     use LawVariable::{Acceleration, OtherPosition, OtherRate, Position, Rate};
     let [low, high] = range(position);
     // Scales of the constants: ranges and largest rates of both places.
@@ -454,9 +419,7 @@ pub(crate) fn factors_with_other(
         places.extend(turns);
     }
     // Waves over the travel of the other place.
-    let waves = [0.5, 1.0, 1.6, 2.3, 3.2].map(|times| LawShape::Wave {
-        pitch: travel / times,
-    });
+    let waves = [0.5, 1.0, 1.6, 2.3, 3.2].map(|times| LawShape::Wave { pitch: travel / times });
     // Smooth signs of a rate.
     let steps = |fastest: f64| {
         [0.02, 0.15, 0.5].map(|part| LawShape::Step {
@@ -501,14 +464,8 @@ pub(crate) fn factors_with_other(
     let few = [LawShape::LINEAR, LawShape::SIGN, LawShape::MAGNITUDE];
     FactorCatalog {
         pairs: vec![
-            [
-                factors_of(OtherPosition, places[..3].iter().copied()),
-                own(),
-            ],
-            [
-                factors_of(OtherPosition, places[3..].iter().copied()),
-                own(),
-            ],
+            [factors_of(OtherPosition, places[..3].iter().copied()), own()],
+            [factors_of(OtherPosition, places[3..].iter().copied()), own()],
             [factors_of(OtherRate, rates.iter().copied()), own()],
             [
                 factors_of(OtherPosition, places[..2].iter().copied()),

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::LawTrial;
 use super::features::LawProduct;
-use super::ground::LawSamples;
+use super::projection::LawSamples;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 use crate::diagnose::noise::effective_samples;
 use crate::diagnose::pool::{dot, solve_gram};
@@ -128,17 +128,10 @@ impl BlockValidation {
     }
 
     /// Fits a law of some products at a place and validates it.
-    pub(crate) fn validate_law(
-        &self,
-        samples: &LawSamples<'_>,
-        site: usize,
-        terms: &[LawProduct],
-    ) -> ValidatedLaw {
+    pub(crate) fn validate_law(&self, samples: &LawSamples<'_>, site: usize, terms: &[LawProduct]) -> ValidatedLaw {
         let channels = samples.channels(site);
         // Columns of the law on the channels on which it has an effect.
-        let own: Vec<Vec<f64>> = (terms.iter())
-            .flat_map(|term| samples.columns(site, term))
-            .collect();
+        let own: Vec<Vec<f64>> = (terms.iter()).flat_map(|term| samples.columns(site, term)).collect();
         let k = samples.picked.len();
         // Number of known columns, without the residual.
         let n = self.grams.first().map_or(0, DMatrix::nrows) - 1;
@@ -165,8 +158,7 @@ impl BlockValidation {
                     }
                     // Products of the law's columns with each other.
                     for (b, other) in own.iter().enumerate().take(a + 1) {
-                        let product =
-                            product_on_block(block, values, &other[part * k..(part + 1) * k]);
+                        let product = product_on_block(block, values, &other[part * k..(part + 1) * k]);
                         whole[(n + a, n + b)] += product;
                         if a != b {
                             whole[(n + b, n + a)] += product;
@@ -181,10 +173,7 @@ impl BlockValidation {
         let zero = || DMatrix::zeros(n + m + 1, n + m + 1);
         // Sums over all blocks, and over those of the fit.
         let whole = grams.iter().fold(zero(), |sum, gram| sum + gram);
-        let of_fit = grams
-            .iter()
-            .zip(&self.is_check)
-            .filter(|(_, check)| !**check);
+        let of_fit = grams.iter().zip(&self.is_check).filter(|(_, check)| !**check);
         let of_fit = of_fit.fold(zero(), |sum, (gram, _)| sum + gram);
         // Factors with -1 appended, so that the squared residual is f' G f.
         let fitted = |gram: &DMatrix<f64>| -> DVector<f64> {

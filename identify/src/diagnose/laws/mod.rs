@@ -4,7 +4,7 @@
 //! Input: the set of effects and its residual. Output: proposals, each with laws that are nearly as good.
 //!
 //! 1. `shapes`, `features` - the grammar; `dimensions` - units of the parameters.
-//! 2. `ground` - thousands of products are scored by inner products, with the base parameters and the effects found
+//! 2. `projection` - thousands of products are scored by inner products, with the base parameters and the effects found
 //!    projected out.
 //! 3. The best product of each form gets its constants refined, and second terms are tried in addition.
 //! 4. `held_out` - what each law explains on time that was not fitted, and which differences are within the noise of
@@ -15,8 +15,8 @@
 
 mod dimensions;
 mod features;
-mod ground;
 mod held_out;
+mod projection;
 mod shapes;
 
 use std::collections::BTreeMap;
@@ -29,12 +29,12 @@ use super::pool::{FitScope, dot};
 use super::problem::{CandidateNature, ColumnProvider, LocatedEffect};
 use super::thresholds::{
     LAW_HOPEFUL_PART, LAW_INDEPENDENT_COLUMNS, LAW_LEAST_NOISE_RATIO, LAW_LEAST_REPEATABLE_SHARE,
-    LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES,
-    MIN_DISTINCTION, SECOND_TERM_LEAST_T,
+    LAW_LEAST_SHARE_ALONE, LAW_MOST_CHANCE, LAW_SAME_SHARE, LEAST_GAIN, MAX_NEAR_TIES, MIN_DISTINCTION,
+    SECOND_TERM_LEAST_T,
 };
 use features::ProductForm;
-use ground::{LawProjection, LawSamples, ScoredProduct, SiteProjection};
 use held_out::{BlockValidation, ValidatedLaw};
+use projection::{LawProjection, LawSamples, ScoredProduct, SiteProjection};
 
 /// A term of a law: a product and its one or more parameters.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,13 +116,7 @@ impl LawBaseline {
     }
 
     /// Adds a law to the columns that are projected out and fitted; `site` is the index of its place.
-    fn add_law(
-        &mut self,
-        few: &LawSamples<'_>,
-        many: &LawSamples<'_>,
-        site: usize,
-        terms: &[LawProduct],
-    ) {
+    fn add_law(&mut self, few: &LawSamples<'_>, many: &LawSamples<'_>, site: usize, terms: &[LawProduct]) {
         for term in terms {
             self.ground = self.ground.conditional_on_product(few, site, term);
         }
@@ -161,12 +155,7 @@ impl ResidualView<'_> {
     }
 
     /// Sum over some channels of a part of the mean square, relative to the variance of the noise.
-    fn squares_over_noise(
-        &self,
-        channels: &[usize],
-        deviations: &[f64],
-        part: &dyn Fn(usize) -> f64,
-    ) -> f64 {
+    fn squares_over_noise(&self, channels: &[usize], deviations: &[f64], part: &dyn Fn(usize) -> f64) -> f64 {
         let scaled = channels
             .iter()
             .map(|d| part(*d) * self.squares_per_sample(*d) / deviations[*d].powi(2));
@@ -186,8 +175,7 @@ impl ResidualView<'_> {
     /// law of few variables may be repeatable where no flexible function of all variables is.
     fn open_channels(&self, noise: &[f64]) -> Vec<usize> {
         let is_suspicious = |d: &usize| {
-            !self.unexplained.contains(d)
-                && self.squares_per_sample(*d) > LAW_LEAST_NOISE_RATIO * noise[*d].powi(2)
+            !self.unexplained.contains(d) && self.squares_per_sample(*d) > LAW_LEAST_NOISE_RATIO * noise[*d].powi(2)
         };
         let others = (0..self.residual.len()).filter(is_suspicious);
         self.unexplained.iter().copied().chain(others).collect()
@@ -222,8 +210,7 @@ pub(crate) fn propose_laws(
     let deviations = left.non_repeatable_deviations(&bench.problem.noise);
     let few = LawSamples::new(bench, &sites, &loads, &deviations, SCREENED);
     let many = LawSamples::new(bench, &sites, &loads, &deviations, VALIDATION_SAMPLES);
-    let base =
-        |picks: Vec<SelectedEffect>| LawBaseline::new(bench, picks, &few, &many, &deviations);
+    let base = |picks: Vec<SelectedEffect>| LawBaseline::new(bench, picks, &few, &many, &deviations);
     // Laws are searched in addition to the effects found, and in place of those on the open channels.
     let mut bases = vec![base(picks.to_vec())];
     let fewer = drop_effects_on(bench, picks, &open);
@@ -237,8 +224,7 @@ pub(crate) fn propose_laws(
         let is_felt = |site: &usize| few.channels(*site).contains(&channel);
         let felt: Vec<usize> = (0..sites.len()).filter(is_felt).collect();
         let squares = |samples: &LawSamples<'_>, site: usize, of: &dyn Fn(usize) -> f64| {
-            samples.picked.len() as f64
-                * left.squares_over_noise(&samples.channels(site), &deviations, of)
+            samples.picked.len() as f64 * left.squares_over_noise(&samples.channels(site), &deviations, of)
         };
         // Least share of the residual that a law must explain on the channels of a place.
         let least = |site: usize| {
@@ -250,9 +236,8 @@ pub(crate) fn propose_laws(
                 LAW_LEAST_SHARE_ALONE
             }
         };
-        let is_hopeful = |one: &ScoredProduct| {
-            one.score >= LAW_HOPEFUL_PART * least(one.site) * squares(&few, one.site, &|_| 1.0)
-        };
+        let is_hopeful =
+            |one: &ScoredProduct| one.score >= LAW_HOPEFUL_PART * least(one.site) * squares(&few, one.site, &|_| 1.0);
         let without = bases[0].held_out.validate_law(&many, 0, &[]);
         let tried = try_laws(bench, &bases, [&few, &many], &felt, &is_hopeful);
         let left_there = |one: &LawTrial| bases[one.base].held_out.residual_at_site(&many, one);
@@ -277,8 +262,7 @@ pub(crate) fn propose_laws(
             let (off, deviation) = without.excess_over(&one.validation);
             gain >= least(one.site) && off > deviation && by_chance < LAW_MOST_CHANCE
         };
-        let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter)
-        else {
+        let Some((chosen, near_ties)) = select_law(tried, &without, &many, &is_one, &scatter) else {
             continue;
         };
         let law = |one: &LawTrial| {
@@ -288,9 +272,7 @@ pub(crate) fn propose_laws(
                 site: one.site,
                 terms: law_terms(one),
                 gain: gain(one),
-                replaced_effects: replaced
-                    .map(|pick| bench.candidate(pick).effect.clone())
-                    .collect(),
+                replaced_effects: replaced.map(|pick| bench.candidate(pick).effect.clone()).collect(),
             }
         };
         proposals.push(LawProposal {
@@ -321,11 +303,7 @@ fn try_laws(
         for (site, terms) in best_laws_by_form(&base.ground, few, sites, is_hopeful) {
             tried.push(LawTrial {
                 validation: base.held_out.validate_law(many, site, &terms),
-                size: beside
-                    + terms
-                        .iter()
-                        .map(|term| 1 + term.description_length())
-                        .sum::<usize>(),
+                size: beside + terms.iter().map(|term| 1 + term.description_length()).sum::<usize>(),
                 base: k,
                 site,
                 terms,
@@ -347,26 +325,17 @@ fn without_motion(site: LawSite) -> LawSite {
 
 /// Effects without those that act on open channels: an effect that was found there may only be the part of the law that
 /// resembles an effect of the library. Disturbances stay.
-fn drop_effects_on(
-    bench: &EffectSelector<'_>,
-    picks: &[SelectedEffect],
-    open: &[usize],
-) -> Vec<SelectedEffect> {
+fn drop_effects_on(bench: &EffectSelector<'_>, picks: &[SelectedEffect], open: &[usize]) -> Vec<SelectedEffect> {
     let stays = |pick: &&SelectedEffect| {
         let channels = bench.affected_channels(std::slice::from_ref(*pick));
-        bench.candidate(pick).nature == CandidateNature::Disturbance
-            || channels.iter().all(|d| !open.contains(d))
+        bench.candidate(pick).nature == CandidateNature::Disturbance || channels.iter().all(|d| !open.contains(d))
     };
     picks.iter().filter(stays).cloned().collect()
 }
 
 /// The terms of a law with their estimates.
 fn law_terms(one: &LawTrial) -> Vec<LawTerm> {
-    let mut parameters = one
-        .validation
-        .values
-        .iter()
-        .zip(&one.validation.standard_deviations);
+    let mut parameters = one.validation.values.iter().zip(&one.validation.standard_deviations);
     let term = |product: &LawProduct| {
         let own = parameters.by_ref().take(product.parameters());
         let (values, deviations) = own.unzip();
@@ -390,9 +359,7 @@ fn best_laws_by_form(
     let parts: BTreeMap<usize, SiteProjection> = (sites.iter())
         .map(|site| (*site, ground.project_at_site(samples, *site)))
         .collect();
-    let screened = parts
-        .values()
-        .flat_map(|part| part.screen_products(samples, &|_| true));
+    let screened = parts.values().flat_map(|part| part.screen_products(samples, &|_| true));
     let mut single: Vec<ScoredProduct> = (best_of_forms(screened, FORMS).into_iter())
         .filter(is_hopeful)
         .map(|one| refine_constants(&parts[&one.site], samples, one))
@@ -401,8 +368,8 @@ fn best_laws_by_form(
     let mut laws: Vec<(usize, Vec<LawProduct>)> = Vec::new();
     // Second terms are scored in the presence of the first.
     for first in single.iter().take(FIRST_TERMS) {
-        let part = (ground.conditional_on_product(samples, first.site, &first.product))
-            .project_at_site(samples, first.site);
+        let part =
+            (ground.conditional_on_product(samples, first.site, &first.product)).project_at_site(samples, first.site);
         let screened = part.screen_products(samples, &|other| first.product.other == Some(other));
         for second in best_of_forms(screened.into_iter(), SECOND_TERMS) {
             let second = refine_constants(&part, samples, second);
@@ -432,11 +399,7 @@ fn best_of_forms(scored: impl Iterator<Item = ScoredProduct>, most: usize) -> Ve
 }
 
 /// The same form with better constants: pattern search with decreasing steps.
-fn refine_constants(
-    part: &SiteProjection,
-    samples: &LawSamples<'_>,
-    mut best: ScoredProduct,
-) -> ScoredProduct {
+fn refine_constants(part: &SiteProjection, samples: &LawSamples<'_>, mut best: ScoredProduct) -> ScoredProduct {
     let [mut step, last] = STEPS;
     for _ in 0..MOST_ROUNDS {
         if step <= last {
@@ -483,8 +446,7 @@ fn select_law(
         terms.any(|term| !term.is_in_library(&samples.sites[one.site]))
     };
     let all = tried.into_iter().filter(is_new);
-    let (mut laws, double): (Vec<LawTrial>, Vec<LawTrial>) =
-        all.partition(|one| one.terms.len() == 1);
+    let (mut laws, double): (Vec<LawTrial>, Vec<LawTrial>) = all.partition(|one| one.terms.len() == 1);
     // Index of the law with the smallest validation error.
     let least = |all: &[LawTrial]| -> Option<usize> {
         let totals = all.iter().map(|one| one.validation.total()).enumerate();
@@ -506,8 +468,7 @@ fn select_law(
     }
     // Keep all laws within the noise of the best, then choose the simplest.
     let less = without.total() - first.validation.total();
-    let most =
-        first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(LAW_SAME_SHARE * less);
+    let most = first.validation.total() + (MIN_DISTINCTION * scatter(first)).max(LAW_SAME_SHARE * less);
     laws.retain(|one| one.validation.total() <= most);
     let simplest = (0..laws.len()).min_by_key(|k| laws[*k].size)?;
     let chosen = laws.remove(simplest);

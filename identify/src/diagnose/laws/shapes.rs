@@ -162,19 +162,11 @@ impl LawShape {
     pub(crate) fn values(self, z: &[f64], starts: &[usize]) -> Vec<Vec<f64>> {
         let each = |of: &dyn Fn(f64) -> f64| vec![z.iter().map(|z| of(*z)).collect()];
         match self {
-            Self::Power {
-                halves,
-                is_odd,
-                scale,
-            } => {
+            Self::Power { halves, is_odd, scale } => {
                 let size = move |z: f64| -> f64 {
                     let z = z.abs() / scale;
                     let whole = z.powi(halves / 2);
-                    if halves % 2 == 0 {
-                        whole
-                    } else {
-                        whole * z.sqrt()
-                    }
+                    if halves % 2 == 0 { whole } else { whole * z.sqrt() }
                 };
                 if is_odd {
                     each(&|z| sign(z) * size(z))
@@ -183,13 +175,9 @@ impl LawShape {
                 }
             }
             Self::Shifted { centre, power } => each(&|z| (z - centre).powi(power)),
-            Self::Hinge { from, side, power } => {
-                each(&|z| (side * (z - from)).max(0.0).powi(power))
-            }
+            Self::Hinge { from, side, power } => each(&|z| (side * (z - from)).max(0.0).powi(power)),
             Self::Wave { pitch } => {
-                let wave = z
-                    .iter()
-                    .map(|z| (std::f64::consts::TAU * z / pitch).sin_cos());
+                let wave = z.iter().map(|z| (std::f64::consts::TAU * z / pitch).sin_cos());
                 let (sin, cos) = wave.unzip();
                 vec![sin, cos]
             }
@@ -215,12 +203,7 @@ impl LawShape {
 
     /// The same shape with one of its [`Self::freedoms`] constants changed, by a share `step` of what is usual for a
     /// variable between `low` and `high`.
-    pub(crate) fn with_moved_constant(
-        self,
-        which: usize,
-        step: f64,
-        [low, high]: [f64; 2],
-    ) -> Self {
+    pub(crate) fn with_moved_constant(self, which: usize, step: f64, [low, high]: [f64; 2]) -> Self {
         let travel = high - low;
         let along = |x: f64| x + step * travel;
         // A shape that is wider than the range is another shape.
@@ -272,9 +255,7 @@ impl LawShape {
                 length: times(length),
                 curve,
             },
-            (Self::Slip { width }, _) => Self::Slip {
-                width: times(width),
-            },
+            (Self::Slip { width }, _) => Self::Slip { width: times(width) },
             (Self::Power { .. }, _) => self,
         }
     }
@@ -328,9 +309,7 @@ fn hysteresis_state(z: &[f64], starts: &[usize], length: f64, curve: i32) -> Vec
 
 /// Elongation of a spring that drags a block, relative to its largest elongation.
 fn dragged_spring(z: &[f64], starts: &[usize], width: f64) -> Vec<f64> {
-    integrate_along(z, starts, |state, moved| {
-        (state + moved / width).clamp(-1.0, 1.0)
-    })
+    integrate_along(z, starts, |state, moved| (state + moved / width).clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]
@@ -361,10 +340,7 @@ mod tests {
         };
         close(at(beyond, 0.5), 0.25);
         close(at(beyond, 1.5), 0.0);
-        let fading = LawShape::Fading {
-            scale: 2.0,
-            halves: 4,
-        };
+        let fading = LawShape::Fading { scale: 2.0, halves: 4 };
         close(at(fading, -2.0), -(-1.0_f64).exp());
     }
 
@@ -375,14 +351,8 @@ mod tests {
         let back = (0..400).map(|i| 4.0 - f64::from(i) * 0.01);
         let way: Vec<f64> = there.chain(back).collect();
         let shapes = [
-            LawShape::Memory {
-                length: 0.2,
-                curve: 1,
-            },
-            LawShape::Memory {
-                length: 0.2,
-                curve: 2,
-            },
+            LawShape::Memory { length: 0.2, curve: 1 },
+            LawShape::Memory { length: 0.2, curve: 2 },
             LawShape::Slip { width: 0.2 },
         ];
         for shape in shapes {

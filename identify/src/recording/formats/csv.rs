@@ -58,8 +58,7 @@ impl RecordingFormat for CsvFormat {
         // The complete text is read to count its samples.
         let (mut reader, _, header_line) = open(&mut stream, Rc::default())?;
         let names = names(&mut reader, header_line)?;
-        let time =
-            likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
+        let time = likely_time_column(&names).and_then(|time| names.iter().position(|name| name == time));
         let mut record = csv::ByteRecord::new();
         let (mut samples, mut span) = (0, None);
         // The first sample decides whether a column has text.
@@ -72,9 +71,7 @@ impl RecordingFormat for CsvFormat {
                 }
             }
             // The last time that is a number ends the range.
-            if let Some(SampleField::Number(t)) =
-                time.and_then(|place| record.get(place)).map(parse)
-            {
+            if let Some(SampleField::Number(t)) = time.and_then(|place| record.get(place)).map(parse) {
                 span = Some((span.map_or(t, |(first, _)| first), t));
             }
         }
@@ -94,11 +91,7 @@ impl RecordingFormat for CsvFormat {
 }
 
 /// Reads the columns that are needed.
-fn read(
-    stream: impl Read,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<SignalRecording, RecordingFault> {
+fn read(stream: impl Read, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     // Bytes since the last record, which limits the memory of a quoted field.
     let since = Rc::new(Cell::new(0));
     let (mut reader, separator, header_line) = open(stream, since.clone())?;
@@ -106,11 +99,7 @@ fn read(
     let mut intake = SampleIntake::new(theirs, options)?;
     // Another separator than a comma is reported.
     if separator != b',' {
-        let name = if separator == b';' {
-            "semicolons"
-        } else {
-            "tabs"
-        };
+        let name = if separator == b';' { "semicolons" } else { "tabs" };
         intake.note(RecordingNote::info(format!(
             "The columns of {file} are separated by {name}."
         )));
@@ -155,10 +144,7 @@ fn read(
 
 /// Opens a stream: returns a reader before the header, the separator, and the line of the header. `since` counts the
 /// bytes that are read.
-fn open(
-    stream: impl Read,
-    since: Rc<Cell<usize>>,
-) -> Result<(csv::Reader<impl Read>, u8, u64), RecordingFault> {
+fn open(stream: impl Read, since: Rc<Cell<usize>>) -> Result<(csv::Reader<impl Read>, u8, u64), RecordingFault> {
     // The header is read first, because it decides the separator.
     let mut stream = BufReader::with_capacity(1 << 16, stream);
     let (header, first_lines) = read_header(&mut stream)?;
@@ -195,10 +181,7 @@ fn open_quote_line(record: &csv::ByteRecord, last: u64, intake: &SampleIntake<'_
     let first = record.iter().position(|field| field.contains(&b'\n'))?;
     let below: u64 = record.iter().skip(first).map(newlines).sum();
     // A quote that is open to the end of the text contains the end of the last line, too.
-    let is_open = record
-        .iter()
-        .next_back()
-        .is_some_and(|field| field.ends_with(b"\n"));
+    let is_open = record.iter().next_back().is_some_and(|field| field.ends_with(b"\n"));
     // A remark in a column that is not needed is harmless.
     let harms = is_open || record.len() != intake.width() || intake.is_place_needed(first);
     harms.then(|| last + u64::from(is_open) - below)
@@ -310,22 +293,15 @@ fn read_header(stream: &mut impl BufRead) -> Result<(String, Vec<u8>), Recording
         [b'P', b'K', 3, 4, ..] => Some("a spreadsheet or ZIP archive"),
         [b'M', b'A', b'T', b'L', b'A', b'B', ..] => Some("a MATLAB file"),
         _ if bytes.contains(&0) => Some("binary data"),
-        line if line.trim_ascii().contains(&b'\r') => {
-            Some("text with lone carriage returns as line ends")
-        }
-        _ if bytes.len() as u64 == LONGEST_HEADER => {
-            Some("a file whose first line is longer than 1 MB")
-        }
+        line if line.trim_ascii().contains(&b'\r') => Some("text with lone carriage returns as line ends"),
+        _ if bytes.len() as u64 == LONGEST_HEADER => Some("a file whose first line is longer than 1 MB"),
         _ => None,
     };
     if let Some(looks_like) = looks_like {
         return Err(RecordingFault::NotCsv { looks_like });
     }
     // Remove the byte order mark.
-    let text = bytes
-        .strip_prefix(b"\xEF\xBB\xBF")
-        .unwrap_or(&bytes)
-        .to_vec();
+    let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&bytes).to_vec();
     let Ok(header) = std::str::from_utf8(&text) else {
         return Err(RecordingFault::NotCsv {
             looks_like: "text in another encoding than UTF-8",

@@ -66,17 +66,10 @@ impl RecordingFormat for DisabledFormat {
     }
 
     fn has_signature(&self, first: &[u8]) -> bool {
-        self.signatures
-            .iter()
-            .any(|signature| first.starts_with(signature))
+        self.signatures.iter().any(|signature| first.starts_with(signature))
     }
 
-    fn read(
-        &self,
-        _: RecordingInput<'_>,
-        _: &str,
-        _: &ReadOptions,
-    ) -> Result<SignalRecording, RecordingFault> {
+    fn read(&self, _: RecordingInput<'_>, _: &str, _: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
         Err(self.fault())
     }
 

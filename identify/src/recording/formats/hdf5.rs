@@ -7,8 +7,7 @@
 use std::io::Cursor;
 
 use hdf5_pure::{
-    Datatype, DatatypeByteOrder, Error, File, FixedPointLayout, FloatingPointLayout, Group,
-    ReadSeekSource,
+    Datatype, DatatypeByteOrder, Error, File, FixedPointLayout, FloatingPointLayout, Group, ReadSeekSource,
 };
 
 use crate::recording::column::SampleField;
@@ -106,11 +105,7 @@ fn open(input: RecordingInput<'_>) -> Result<File, RecordingFault> {
 }
 
 /// Reads the columns that are needed.
-fn read(
-    opened: &File,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<SignalRecording, RecordingFault> {
+fn read(opened: &File, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     let columns = HdfColumns::new(opened)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
     // Datasets that are no columns are reported.
@@ -118,11 +113,7 @@ fn read(
         intake.note(RecordingNote::info(format!(
             "{} of {file} {} skipped, because of another number of samples or without numbers.",
             backquoted_list(&columns.others),
-            if columns.others.len() == 1 {
-                "is"
-            } else {
-                "are"
-            },
+            if columns.others.len() == 1 { "is" } else { "are" },
         )));
     }
     let is_read = |place: &usize| intake.is_place_needed(*place);
@@ -193,12 +184,7 @@ impl HdfColumns {
         let mut others = Vec::new();
         collect_datasets(&file.root(), "", 0, &mut found, &mut others)?;
         // The number of samples is the longest side of any dataset.
-        let samples = found
-            .iter()
-            .flat_map(|one| &one.shape)
-            .copied()
-            .max()
-            .unwrap_or(0);
+        let samples = found.iter().flat_map(|one| &one.shape).copied().max().unwrap_or(0);
         if samples == 0 {
             return Err(format_fault("it contains no datasets of numbers"));
         }
@@ -222,19 +208,14 @@ impl HdfColumns {
             // Samples are the rows of an upright matrix, otherwise its columns.
             let is_upright = rows == samples;
             let n = if is_upright { width } else { rows };
-            if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64
-            {
+            if columns.consistent.len() as u64 + n * one.numbers.len() as u64 > MOST_COLUMNS as u64 {
                 return Err(format_fault("it has more columns than any recording"));
             }
             // Each column of the matrix has one column for each number of its elements.
             for k in 0..n {
                 for (field, number) in &one.numbers {
                     // A dataset with a single column needs no number in the name.
-                    let number_of = if n == 1 {
-                        String::new()
-                    } else {
-                        format!("_{}", k + 1)
-                    };
+                    let number_of = if n == 1 { String::new() } else { format!("_{}", k + 1) };
                     columns.consistent.push(HdfColumn {
                         name: format!("{}{number_of}{field}", one.name),
                         path: one.path.clone(),
@@ -253,10 +234,7 @@ impl HdfColumns {
 
     /// Names of the columns, in the order of the file.
     fn names(&self) -> Vec<String> {
-        self.consistent
-            .iter()
-            .map(|column| column.name.clone())
-            .collect()
+        self.consistent.iter().map(|column| column.name.clone()).collect()
     }
 }
 
@@ -290,9 +268,7 @@ fn collect_datasets(
     for dataset in group.datasets().map_err(|error| unreadable_fault(&error))? {
         let path = format!("{path}/{dataset}");
         let name = path[1..].replace('/', ".");
-        let dataset = group
-            .dataset(&dataset)
-            .map_err(|error| unreadable_fault(&error))?;
+        let dataset = group.dataset(&dataset).map_err(|error| unreadable_fault(&error))?;
         // A type that the library does not know is skipped.
         let (Ok(kind), Ok(shape)) = (dataset.datatype(), dataset.shape()) else {
             others.push(name);
@@ -300,27 +276,17 @@ fn collect_datasets(
         };
         // The numbers within an element, with the names of their fields.
         let mut numbers = Vec::new();
-        HdfNumber::collect_numbers(
-            &kind,
-            String::new(),
-            0,
-            u64::from(kind.type_size()),
-            &mut numbers,
-        );
+        HdfNumber::collect_numbers(&kind, String::new(), 0, u64::from(kind.type_size()), &mut numbers);
         if numbers.is_empty() || numbers.len() > MOST_COLUMNS {
             others.push(name);
             continue;
         }
         // The library reads complete chunks, so their size is limited.
-        let chunk = dataset
-            .chunk_shape()
-            .map_err(|error| unreadable_fault(&error))?;
+        let chunk = dataset.chunk_shape().map_err(|error| unreadable_fault(&error))?;
         let size = chunk
             .unwrap_or_default()
             .iter()
-            .fold(u64::from(kind.type_size()), |size, side| {
-                size.saturating_mul(*side)
-            });
+            .fold(u64::from(kind.type_size()), |size, side| size.saturating_mul(*side));
         if size > LARGEST_CHUNK {
             return Err(format_fault(format!(
                 "`{name}` is stored in chunks of {size} bytes; store it in smaller ones"
@@ -338,16 +304,8 @@ fn collect_datasets(
         if MATLAB_GROUPS.contains(&inner.as_str()) {
             continue;
         }
-        let within = group
-            .group(&inner)
-            .map_err(|error| unreadable_fault(&error))?;
-        collect_datasets(
-            &within,
-            &format!("{path}/{inner}"),
-            depth + 1,
-            found,
-            others,
-        )?;
+        let within = group.group(&inner).map_err(|error| unreadable_fault(&error))?;
+        collect_datasets(&within, &format!("{path}/{inner}"), depth + 1, found, others)?;
     }
     Ok(())
 }
@@ -357,9 +315,7 @@ impl HdfColumn {
     ///
     /// Fails when the dataset is shorter than its declared size.
     fn read_numbers(&self, file: &File, samples: usize) -> Result<Vec<f64>, RecordingFault> {
-        let dataset = file
-            .dataset(&self.path)
-            .map_err(|error| unreadable_fault(&error))?;
+        let dataset = file.dataset(&self.path).map_err(|error| unreadable_fault(&error))?;
         let mut values = Vec::new();
         // Bytes of an element of the dataset.
         let size = usize::try_from(self.number.element).unwrap_or(usize::MAX);
@@ -371,9 +327,7 @@ impl HdfColumn {
         // A row is read at once; a column is read in groups of rows.
         match self.place {
             HdfColumnPlace::Row(k) => {
-                let bytes = dataset
-                    .read_raw_rows(k, 1)
-                    .map_err(|error| unreadable_fault(&error))?;
+                let bytes = dataset.read_raw_rows(k, 1).map_err(|error| unreadable_fault(&error))?;
                 take(&bytes, 1, 0);
             }
             // Bytes of a row, and the number of rows per part.
@@ -433,13 +387,7 @@ impl HdfNumber {
     /// Collects the numbers of a type, each with the suffix that it adds to the name of the dataset.
     ///
     /// `at` is the position of the type in an element of `element` bytes. Other types are ignored.
-    fn collect_numbers(
-        kind: &Datatype,
-        name: String,
-        at: u64,
-        element: u64,
-        numbers: &mut Vec<(String, Self)>,
-    ) {
+    fn collect_numbers(kind: &Datatype, name: String, at: u64, element: u64, numbers: &mut Vec<(String, Self)>) {
         let size = kind.type_size();
         let (order, kind) = match kind {
             // Integers that fill their bytes.
@@ -461,10 +409,9 @@ impl HdfNumber {
                 (*byte_order, kind)
             }
             // IEEE floats; other layouts are not supported.
-            Datatype::FloatingPoint {
-                byte_order, layout, ..
-            } if *layout == FloatingPointLayout::IEEE754_BINARY32
-                || *layout == FloatingPointLayout::IEEE754_BINARY64 =>
+            Datatype::FloatingPoint { byte_order, layout, .. }
+                if *layout == FloatingPointLayout::IEEE754_BINARY32
+                    || *layout == FloatingPointLayout::IEEE754_BINARY64 =>
             {
                 (*byte_order, HdfNumberKind::Float)
             }
@@ -482,22 +429,11 @@ impl HdfNumber {
                 return;
             }
             // The elements of an array, numbered from 1.
-            Datatype::Array {
-                base_type,
-                dimensions,
-            } => {
-                let n = dimensions
-                    .iter()
-                    .fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
+            Datatype::Array { base_type, dimensions } => {
+                let n = dimensions.iter().fold(1_u64, |n, d| n.saturating_mul(u64::from(*d)));
                 for k in 0..n.min(MOST_COLUMNS as u64) {
                     let at = at.saturating_add(k * u64::from(base_type.type_size()));
-                    Self::collect_numbers(
-                        base_type,
-                        format!("{name}_{}", k + 1),
-                        at,
-                        element,
-                        numbers,
-                    );
+                    Self::collect_numbers(base_type, format!("{name}_{}", k + 1), at, element, numbers);
                 }
                 return;
             }
@@ -523,11 +459,7 @@ impl HdfNumber {
         let mut bytes = [0; 8];
         let stored = &element[self.at..self.at + self.size];
         for (k, byte) in bytes.iter_mut().zip(0..self.size) {
-            *k = stored[if self.is_big {
-                self.size - 1 - byte
-            } else {
-                byte
-            }];
+            *k = stored[if self.is_big { self.size - 1 - byte } else { byte }];
         }
         // Shifting left and back extends the sign.
         let bits = u64::from_le_bytes(bytes);

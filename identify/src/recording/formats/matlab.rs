@@ -71,22 +71,14 @@ impl RecordingFormat for Matlab5Format {
                 stream.rewind().ok()?;
                 read(&mut stream, "", &ReadOptions::single_column(name)).ok()
             }),
-            remark: (!columns.others.is_empty()).then(|| {
-                format!(
-                    "skipped, of another length: {}",
-                    backquoted_list(&columns.others)
-                )
-            }),
+            remark: (!columns.others.is_empty())
+                .then(|| format!("skipped, of another length: {}", backquoted_list(&columns.others))),
         }])
     }
 }
 
 /// Reads the columns that are needed.
-fn read(
-    stream: impl Read + Seek,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<SignalRecording, RecordingFault> {
+fn read(stream: impl Read + Seek, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     let mut arrays = open(stream)?;
     let columns = MatlabColumns::new(&arrays)?;
     let mut intake = SampleIntake::new(columns.names(), options)?;
@@ -95,11 +87,7 @@ fn read(
         intake.note(RecordingNote::info(format!(
             "{} of {file} {} skipped, because of another number of samples.",
             backquoted_list(&columns.others),
-            if columns.others.len() == 1 {
-                "is"
-            } else {
-                "are"
-            },
+            if columns.others.len() == 1 { "is" } else { "are" },
         )));
     }
     // Only arrays with a needed column are read.
@@ -108,14 +96,8 @@ fn read(
         wanted[column.array] |= intake.is_place_needed(place) && !column.is_complex;
     }
     // An array is read completely, and its numbers exist twice until all samples are taken.
-    let sizes = arrays
-        .arrays
-        .iter()
-        .zip(&wanted)
-        .filter(|(_, wanted)| **wanted);
-    let numbers: usize = sizes
-        .map(|(array, _)| array.size.iter().product::<usize>())
-        .sum();
+    let sizes = arrays.arrays.iter().zip(&wanted).filter(|(_, wanted)| **wanted);
+    let numbers: usize = sizes.map(|(array, _)| array.size.iter().product::<usize>()).sum();
     if numbers > options.max_numbers / 2 {
         return Err(format_fault(
             "it is too large to be read completely; save it as CSV or Parquet, which can be read in parts",
@@ -125,9 +107,7 @@ fn read(
     let mut values = Vec::new();
     for (array, wanted) in arrays.arrays.clone().iter().zip(wanted) {
         values.push(if wanted {
-            arrays
-                .read_numbers(array)
-                .map_err(|error| unreadable_fault(&error))?
+            arrays.read_numbers(array).map_err(|error| unreadable_fault(&error))?
         } else {
             Vec::new()
         });
@@ -136,10 +116,7 @@ fn read(
     let value = |place: usize, k: usize| {
         let column = &columns.consistent[place];
         let numbers = &values[column.array];
-        numbers
-            .get(column.first + k * column.step)
-            .copied()
-            .unwrap_or(0.0)
+        numbers.get(column.first + k * column.step).copied().unwrap_or(0.0)
     };
     // Pass the samples to the intake, one row after another.
     let mut sample = Vec::new();
@@ -249,10 +226,7 @@ impl MatlabColumns {
 
     /// Names of the columns, in the order of the file.
     fn names(&self) -> Vec<String> {
-        self.consistent
-            .iter()
-            .map(|column| column.name.clone())
-            .collect()
+        self.consistent.iter().map(|column| column.name.clone()).collect()
     }
 }
 
@@ -266,7 +240,5 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 
 /// The fault of a file that cannot be read.
 fn unreadable_fault(error: &std::io::Error) -> RecordingFault {
-    format_fault(format!(
-        "it cannot be read: {error}; save it again with `-v7`"
-    ))
+    format_fault(format!("it cannot be read: {error}; save it again with `-v7`"))
 }

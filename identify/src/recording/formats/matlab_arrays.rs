@@ -86,9 +86,7 @@ impl<R: Read + Seek> MatlabArrayFile<R> {
                     is_compressed,
                 };
                 // A compressed element whose contents are not an array gives nothing.
-                arrays.extend(
-                    place.open(&mut stream, is_little, |element| element.read_array(&place))?,
-                );
+                arrays.extend(place.open(&mut stream, is_little, |element| element.read_array(&place))?);
             }
             // Compressed elements have no padding.
             at += if is_compressed {
@@ -270,9 +268,7 @@ impl<'a> MatlabElementReader<'a> {
         let data = self.read_tag()?;
         self.data = Some(data);
         // A product that overflows cannot agree with the length.
-        let numbers = size
-            .iter()
-            .try_fold(1, |n: usize, side| n.checked_mul(*side));
+        let numbers = size.iter().try_fold(1, |n: usize, side| n.checked_mul(*side));
         let bytes = numbers.and_then(|n| n.checked_mul(number_width(data.kind)?));
         Ok(Some(MatlabArray {
             name: String::from_utf8_lossy(&name).into_owned(),
@@ -287,8 +283,7 @@ impl<'a> MatlabElementReader<'a> {
 
     /// Reads the numbers of an element, converted from any type.
     fn read_numbers(&mut self, tag: &MatlabTag) -> io::Result<Vec<f64>> {
-        let width =
-            number_width(tag.kind).ok_or_else(|| io::Error::other("it contains no numbers"))?;
+        let width = number_width(tag.kind).ok_or_else(|| io::Error::other("it contains no numbers"))?;
         let mut numbers = Vec::new();
         let mut left = tag.length as usize;
         let mut chunk = vec![0; CHUNK.min(left)];

@@ -59,9 +59,7 @@ impl RecordingFormat for McapFormat {
 }
 
 /// A function that passes the messages of a file to a collector; a stream can be read only once.
-fn replay_once(
-    input: RecordingInput<'_>,
-) -> impl FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault> + use<'_> {
+fn replay_once(input: RecordingInput<'_>) -> impl FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault> + use<'_> {
     let mut stream = Some(input.stream());
     move |bag| match stream.take() {
         Some(stream) => replay_messages(stream, bag),
@@ -81,9 +79,7 @@ fn replay_messages(stream: impl Read, bag: &mut BagCollector<'_>) -> Result<(), 
     // Each record has its kind, the length of its contents, and the contents.
     loop {
         let mut kind = [0];
-        stream
-            .read_exact(&mut kind)
-            .map_err(|error| unreadable_fault(&error))?;
+        stream.read_exact(&mut kind).map_err(|error| unreadable_fault(&error))?;
         let mut length = [0; 8];
         stream
             .read_exact(&mut length)
@@ -93,10 +89,7 @@ fn replay_messages(stream: impl Read, bag: &mut BagCollector<'_>) -> Result<(), 
             // The records behind the end of the data repeat it as an index.
             McapRecordKind::DATA_END | McapRecordKind::FOOTER => return Ok(()),
             // These records are needed in memory.
-            McapRecordKind::CHUNK
-            | McapRecordKind::SCHEMA
-            | McapRecordKind::CHANNEL
-            | McapRecordKind::MESSAGE => {
+            McapRecordKind::CHUNK | McapRecordKind::SCHEMA | McapRecordKind::CHANNEL | McapRecordKind::MESSAGE => {
                 if length > LARGEST {
                     return Err(format_fault("a record in it is larger than 128 MB"));
                 }
@@ -154,12 +147,7 @@ struct McapFileState {
 
 impl McapFileState {
     /// Takes a record; definitions and channels are remembered, messages are passed on.
-    fn take_record(
-        &mut self,
-        kind: u8,
-        bytes: &[u8],
-        bag: &mut BagCollector<'_>,
-    ) -> Result<(), RecordingFault> {
+    fn take_record(&mut self, kind: u8, bytes: &[u8], bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
         let mut fields = McapFieldReader(bytes);
         match kind {
             // Number, name, encoding and text of the definition.
@@ -220,17 +208,12 @@ impl McapFileState {
                 // The ratio of both sums is limited over the complete file.
                 self.packed += length;
                 self.unpacked = self.unpacked.saturating_add(unpacked);
-                check_growth(self.packed, self.unpacked)
-                    .map_err(|error| unreadable_fault(&error))?;
+                check_growth(self.packed, self.unpacked).map_err(|error| unreadable_fault(&error))?;
                 match packing {
                     None => self.take_chunk(fields.0, sum, bag)?,
                     Some(packing) => {
                         let bytes = packing.decompress(fields.0, unpacked);
-                        self.take_chunk(
-                            &bytes.map_err(|error| unreadable_fault(&error))?,
-                            sum,
-                            bag,
-                        )?;
+                        self.take_chunk(&bytes.map_err(|error| unreadable_fault(&error))?, sum, bag)?;
                     }
                 }
             }
@@ -240,12 +223,7 @@ impl McapFileState {
     }
 
     /// Takes the records in a chunk; `sum` is its CRC-32, or zero if there is none.
-    fn take_chunk(
-        &mut self,
-        bytes: &[u8],
-        sum: u32,
-        bag: &mut BagCollector<'_>,
-    ) -> Result<(), RecordingFault> {
+    fn take_chunk(&mut self, bytes: &[u8], sum: u32, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
         if sum != 0 {
             let mut crc = flate2::Crc::new();
             crc.update(bytes);
@@ -320,9 +298,7 @@ fn format_fault(says: impl Into<String>) -> RecordingFault {
 /// The fault of a stream that cannot be read or ends too early.
 fn unreadable_fault(error: &io::Error) -> RecordingFault {
     if error.kind() == io::ErrorKind::UnexpectedEof {
-        return format_fault(
-            "it ends before the end of its data; copy it again, or repair it with `mcap recover`",
-        );
+        return format_fault("it ends before the end of its data; copy it again, or repair it with `mcap recover`");
     }
     format_fault(format!("it cannot be read: {error}"))
 }

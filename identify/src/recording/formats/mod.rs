@@ -152,9 +152,7 @@ pub(crate) fn read_all(stream: impl Read) -> Result<Vec<u8>, RecordingFault> {
     let read = stream.take(LONGEST_STREAM + 1).read_to_end(&mut bytes);
     read.map_err(|error| unreadable(error.to_string()))?;
     if bytes.len() as u64 > LONGEST_STREAM {
-        return Err(unreadable(format!(
-            "it has more than {LONGEST_STREAM} bytes"
-        )));
+        return Err(unreadable(format!("it has more than {LONGEST_STREAM} bytes")));
     }
     Ok(bytes)
 }

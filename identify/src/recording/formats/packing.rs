@@ -11,9 +11,7 @@ use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
 use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 
 use crate::recording::error::RecordingFault;
-use crate::recording::formats::{
-    RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of,
-};
+use crate::recording::formats::{RecordingFormat, RecordingInput, SIGNATURE_BYTES, TableInfo, format_of};
 use crate::recording::{ReadOptions, SignalRecording};
 
 /// Largest window of zstd in bytes; its own program allows the same.
@@ -70,9 +68,7 @@ impl CompressionMethod {
             .take(most.saturating_add(1))
             .read_to_end(&mut bytes)?;
         if bytes.len() as u64 > most {
-            return Err(io::Error::other(
-                "it decompresses to more than the file declares",
-            ));
+            return Err(io::Error::other("it decompresses to more than the file declares"));
         }
         Ok(bytes)
     }
@@ -121,10 +117,7 @@ impl<R: Read> ZstdReader<R> {
             match self.decoder.init(&mut self.packed) {
                 Ok(()) => return Ok(true),
                 // Skippable frames contain data of other programs.
-                Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
-                    length,
-                    ..
-                })) => {
+                Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame { length, .. })) => {
                     let mut passed = (&mut self.packed).take(u64::from(length));
                     io::copy(&mut passed, &mut io::sink())?;
                 }
@@ -245,9 +238,7 @@ impl CompressedFormat {
         };
         // Read the first bytes to recognise the format, and put them back in front.
         let mut first = Vec::new();
-        let head = (&mut stream)
-            .take(SIGNATURE_BYTES as u64)
-            .read_to_end(&mut first);
+        let head = (&mut stream).take(SIGNATURE_BYTES as u64).read_to_end(&mut first);
         head.map_err(|error| self.decompression_fault(&error.to_string()))?;
         let format = format_of(&first);
         if format.is_compressed() {

@@ -11,9 +11,7 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader}
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::RowGroupMetaData;
-use parquet::file::reader::{
-    ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader,
-};
+use parquet::file::reader::{ChunkReader, FileReader, Length, RowGroupReader, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
@@ -75,12 +73,8 @@ impl RecordingFormat for ParquetFormat {
     fn tables(&self, input: RecordingInput<'_>) -> Result<Vec<TableInfo>, RecordingFault> {
         match input {
             RecordingInput::File(stream) => tables_of(SharedChunkReader(Arc::new(stream))),
-            RecordingInput::Bytes(bytes) => {
-                tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes))))
-            }
-            RecordingInput::Stream(stream) => {
-                tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?))))
-            }
+            RecordingInput::Bytes(bytes) => tables_of(SharedChunkReader(Arc::new(Bytes::copy_from_slice(bytes)))),
+            RecordingInput::Stream(stream) => tables_of(SharedChunkReader(Arc::new(Bytes::from(read_all(stream)?)))),
         }
     }
 }
@@ -93,8 +87,7 @@ fn read(
 ) -> Result<SignalRecording, RecordingFault> {
     // The stream is shared between the checks of pages and the reader.
     let bytes = Arc::new(stream);
-    let reader =
-        SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
+    let reader = SerializedFileReader::new(SharedChunkReader(bytes.clone())).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let width = schema.num_columns();
     let mut intake = SampleIntake::new(names(&reader), options)?;
@@ -112,8 +105,7 @@ fn read(
         }
     }
     // Columns without numbers are not read, but reported as text if they are needed.
-    let is_read =
-        |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
+    let is_read = |i: usize| intake.is_place_needed(i) && !matches!(kinds[i], ParquetValueKind::Unusable);
     let wanted: Vec<bool> = (0..width).map(is_read).collect();
     // The size of a batch keeps the number of fields in memory small.
     let n_read = wanted.iter().filter(|is_read| **is_read).count();
@@ -150,9 +142,7 @@ fn read(
                     *field = match fields[i].get(k) {
                         Some(field) => *field,
                         // A column that is not needed.
-                        None if columns[i].is_none() && !intake.is_place_needed(i) => {
-                            SampleField::Number(0.0)
-                        }
+                        None if columns[i].is_none() && !intake.is_place_needed(i) => SampleField::Number(0.0),
                         None => SampleField::Text,
                     };
                 }
@@ -194,27 +184,17 @@ fn column_reader<R: ChunkReader + 'static>(
         .build()
         .map_err(parquet_fault)?;
     let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-    let pages =
-        SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
+    let pages = SerializedPageReader::new(bytes.clone(), &as_stored, rows, None).map_err(parquet_fault)?;
     let pages = UnpackedPages { pages, packing };
     Ok(get_column_reader(column.clone(), Box::new(pages)))
 }
 
 /// Fails when the pages of a row group would need too much memory. Nothing is decompressed for this, except gzip.
-fn check_pages<R: ChunkReader>(
-    bytes: &R,
-    group: &RowGroupMetaData,
-    wanted: &[bool],
-) -> Result<(), RecordingFault> {
+fn check_pages<R: ChunkReader>(bytes: &R, group: &RowGroupMetaData, wanted: &[bool]) -> Result<(), RecordingFault> {
     let refused = |error: io::Error| parquet_fault(ParquetError::General(error.to_string()));
     let mut sum = 0;
     // The largest pages of all needed columns are added.
-    for (column, _) in group
-        .columns()
-        .iter()
-        .zip(wanted)
-        .filter(|(_, is_wanted)| **is_wanted)
-    {
+    for (column, _) in group.columns().iter().zip(wanted).filter(|(_, is_wanted)| **is_wanted) {
         // The compression decides whether the declared size can be trusted.
         let growth = match column.compression() {
             Compression::GZIP(_) => PageGrowth::Gzip,
@@ -225,10 +205,7 @@ fn check_pages<R: ChunkReader>(
         let start = column
             .dictionary_page_offset()
             .unwrap_or_else(|| column.data_page_offset());
-        let (start, length) = (
-            u64::try_from(start),
-            u64::try_from(column.compressed_size()),
-        );
+        let (start, length) = (u64::try_from(start), u64::try_from(column.compressed_size()));
         let (Ok(start), Ok(length)) = (start, length) else {
             return Err(refused(io::Error::other("a column has a negative place")));
         };
@@ -237,9 +214,7 @@ fn check_pages<R: ChunkReader>(
     }
     // One page of each column is in memory at the same time.
     if sum > MOST_UNPACKED {
-        return Err(refused(io::Error::other(
-            "its pages would take too much memory",
-        )));
+        return Err(refused(io::Error::other("its pages would take too much memory")));
     }
     Ok(())
 }
@@ -273,9 +248,7 @@ impl<R: ChunkReader> ChunkReader for SharedChunkReader<R> {
 }
 
 /// The single table of a file.
-fn tables_of(
-    stream: SharedChunkReader<impl ChunkReader + 'static>,
-) -> Result<Vec<TableInfo>, RecordingFault> {
+fn tables_of(stream: SharedChunkReader<impl ChunkReader + 'static>) -> Result<Vec<TableInfo>, RecordingFault> {
     let reader = SerializedFileReader::new(stream.clone()).map_err(parquet_fault)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let info = |column: &ColumnDescPtr| ColumnInfo {
@@ -290,19 +263,14 @@ fn tables_of(
         columns: schema.columns().iter().map(info).collect(),
         samples: usize::try_from(rows).unwrap_or(0),
         // The time column is read completely for its range.
-        time: find_time_range(&names, |name| {
-            read(stream, "", &ReadOptions::single_column(name)).ok()
-        }),
+        time: find_time_range(&names, |name| read(stream, "", &ReadOptions::single_column(name)).ok()),
         remark: None,
     }])
 }
 
 /// Type of a column, in the words that other formats use.
 fn kind_of(column: &ColumnDescriptor) -> String {
-    let kind = match (
-        ParquetValueKind::from_column(column),
-        column.physical_type(),
-    ) {
+    let kind = match (ParquetValueKind::from_column(column), column.physical_type()) {
         (ParquetValueKind::Ticks { .. }, _) | (_, Type::INT96) => "time",
         (ParquetValueKind::Decimal(_), _) => "decimal",
         (ParquetValueKind::Unusable, _) => "no number",
@@ -319,9 +287,7 @@ fn kind_of(column: &ColumnDescriptor) -> String {
 
 /// Names of the columns; names of nested ones contain points.
 fn names_of(stream: impl ChunkReader + 'static) -> Result<Vec<String>, RecordingFault> {
-    Ok(names(
-        &SerializedFileReader::new(stream).map_err(parquet_fault)?,
-    ))
+    Ok(names(&SerializedFileReader::new(stream).map_err(parquet_fault)?))
 }
 
 /// Names of the columns of an open file, by their paths.
@@ -358,10 +324,7 @@ impl ParquetValueKind {
             first: None,
         };
         // Texts are not numbers, and a few bytes of a dictionary may expand to very long ones.
-        let is_text = matches!(
-            column.physical_type(),
-            Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY
-        );
+        let is_text = matches!(column.physical_type(), Type::BYTE_ARRAY | Type::FIXED_LEN_BYTE_ARRAY);
         // Repeated fields have no value per sample.
         if column.max_rep_level() > 0 || is_text {
             return Self::Unusable;
@@ -377,10 +340,9 @@ impl ParquetValueKind {
             ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS => ticks(1e3),
             ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => ticks(1e6),
             ConvertedType::DECIMAL => Self::Decimal(column.type_scale()),
-            ConvertedType::UINT_8
-            | ConvertedType::UINT_16
-            | ConvertedType::UINT_32
-            | ConvertedType::UINT_64 => Self::Unsigned,
+            ConvertedType::UINT_8 | ConvertedType::UINT_16 | ConvertedType::UINT_32 | ConvertedType::UINT_64 => {
+                Self::Unsigned
+            }
             _ => Self::Numbers,
         }
     }
@@ -389,9 +351,7 @@ impl ParquetValueKind {
     fn convert_integer(&mut self, value: i64) -> f64 {
         match self {
             // Differences of ticks in a recording are far below 2^53, so that floats are exact.
-            Self::Ticks { per_second, first } => {
-                value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second
-            }
+            Self::Ticks { per_second, first } => value.wrapping_sub(*first.get_or_insert(value)) as f64 / *per_second,
             Self::Decimal(scale) => value as f64 / 10.0_f64.powi(*scale),
             Self::Unsigned => value.cast_unsigned() as f64,
             Self::Numbers | Self::Unusable => value as f64,
@@ -424,15 +384,15 @@ fn read_batch(
     n: usize,
 ) -> Result<Vec<SampleField>, RecordingFault> {
     match column {
-        ColumnReader::BoolColumnReader(reader) => read_values(reader, n, |value| {
-            SampleField::Number(f64::from(u8::from(*value)))
-        }),
+        ColumnReader::BoolColumnReader(reader) => {
+            read_values(reader, n, |value| SampleField::Number(f64::from(u8::from(*value))))
+        }
         ColumnReader::Int32ColumnReader(reader) => read_values(reader, n, |value| {
             SampleField::finite(kind.convert_short_integer(*value))
         }),
-        ColumnReader::Int64ColumnReader(reader) => read_values(reader, n, |value| {
-            SampleField::finite(kind.convert_integer(*value))
-        }),
+        ColumnReader::Int64ColumnReader(reader) => {
+            read_values(reader, n, |value| SampleField::finite(kind.convert_integer(*value)))
+        }
         // Times of 12 bytes are converted to nanoseconds.
         ColumnReader::Int96ColumnReader(reader) => {
             let mut ticks = ParquetValueKind::Ticks {
@@ -452,9 +412,7 @@ fn read_batch(
         ColumnReader::FloatColumnReader(reader) => {
             read_values(reader, n, |value| SampleField::finite(f64::from(*value)))
         }
-        ColumnReader::DoubleColumnReader(reader) => {
-            read_values(reader, n, |value| SampleField::finite(*value))
-        }
+        ColumnReader::DoubleColumnReader(reader) => read_values(reader, n, |value| SampleField::finite(*value)),
         // Columns of texts are never read.
         ColumnReader::ByteArrayColumnReader(_) | ColumnReader::FixedLenByteArrayColumnReader(_) => {
             Ok(vec![SampleField::Text; n])

@@ -125,9 +125,7 @@ impl<P: PageReader> UnpackedPages<P> {
                 let levels = u64::from(def_levels_byte_len) + u64::from(rep_levels_byte_len);
                 let levels = usize::try_from(levels).unwrap_or(usize::MAX);
                 let Some((levels, values)) = buf.split_at_checked(levels) else {
-                    return Err(ParquetError::General(
-                        "a page is shorter than its levels".to_owned(),
-                    ));
+                    return Err(ParquetError::General("a page is shorter than its levels".to_owned()));
                 };
                 let buf = if is_compressed && !values.is_empty() {
                     [levels, &unpack(values)?].concat().into()
@@ -382,9 +380,7 @@ mod tests {
         second.extend(whole(6));
         second.push(0x15);
         second.extend(whole(6));
-        second.extend([
-            0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0,
-        ]);
+        second.extend([0x5c, 0x15, 2, 0x15, 0, 0x15, 2, 0x15, 0, 0x15, 4, 0x15, 0, 0x12, 0, 0]);
         second.extend(b"llabcd");
         assert_eq!(look(&second, PageGrowth::Gzip), Ok(6));
     }

@@ -58,10 +58,7 @@ impl RecordingFormat for Rosbag2Format {
 
 /// Registers the topics of a database and passes all its messages to the collector.
 /// Fails when the tables of a log are missing, or when a message cannot be read.
-fn replay_messages(
-    stream: &mut dyn ReadSeek,
-    bag: &mut BagCollector<'_>,
-) -> Result<(), RecordingFault> {
+fn replay_messages(stream: &mut dyn ReadSeek, bag: &mut BagCollector<'_>) -> Result<(), RecordingFault> {
     // Definitions of message types; older files do not have this table.
     let mut database = SqliteDatabase::open(stream).map_err(|error| unreadable_fault(&error))?;
     let mut definitions = BTreeMap::new();
@@ -84,17 +81,13 @@ fn replay_messages(
         .visit_rows("topics", &columns, &mut |row| {
             if let [SqliteValue::Integer(id), name, kind, form] = &row[..] {
                 // Without a definition the collector uses its own ones for common types.
-                let (definition, text) =
-                    definitions.get(kind.as_text()).cloned().unwrap_or_default();
+                let (definition, text) = definitions.get(kind.as_text()).cloned().unwrap_or_default();
                 let encoding = BagEncoding {
                     messages: form.as_text(),
                     definition: &definition,
                     text: &text,
                 };
-                topics.insert(
-                    *id,
-                    bag.register_topic(name.as_text(), kind.as_text(), &encoding),
-                );
+                topics.insert(*id, bag.register_topic(name.as_text(), kind.as_text(), &encoding));
             }
             Ok(())
         })
@@ -104,9 +97,7 @@ fn replay_messages(
     let columns = ["topic_id", "timestamp", "data"];
     let has_messages = database.visit_rows("messages", &columns, &mut |row| {
         let [topic, SqliteValue::Integer(time), SqliteValue::Bytes(bytes)] = &row[..] else {
-            return Err(io::Error::other(
-                "a row of `messages` in it is not a message",
-            ));
+            return Err(io::Error::other("a row of `messages` in it is not a message"));
         };
         // Each message must belong to a topic.
         let Some(topic) = topic.as_integer().and_then(|id| topics.get(&id)) else {

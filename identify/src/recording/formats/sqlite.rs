@@ -157,9 +157,7 @@ impl<R: Read + Seek> SqliteDatabase<R> {
         // Positions of the columns in a row.
         let places = columns.iter().map(|name| {
             let place = table.columns.iter().position(|other| other == name);
-            place.ok_or_else(|| {
-                io::Error::other(format!("its table `{}` has no column `{name}`", table.name))
-            })
+            place.ok_or_else(|| io::Error::other(format!("its table `{}` has no column `{name}`", table.name)))
         });
         let places = places.collect::<io::Result<Vec<usize>>>()?;
         // Values are moved out of the row, because each is used once.
@@ -363,9 +361,7 @@ fn read_record(bytes: &[u8]) -> io::Result<Vec<SqliteValue>> {
 fn read_integer(bytes: &[u8]) -> i64 {
     let sign = bytes.first().is_some_and(|byte| byte & 0x80 != 0);
     let start = if sign { -1 } else { 0 };
-    bytes
-        .iter()
-        .fold(start, |value, byte| value << 8 | i64::from(*byte))
+    bytes.iter().fold(start, |value, byte| value << 8 | i64::from(*byte))
 }
 
 /// Names of the columns in a statement `CREATE TABLE`, and the position of the one that is the row number.
@@ -398,15 +394,10 @@ fn columns_of(says: &str) -> (Vec<String>, Option<usize>) {
             continue;
         }
         let constraints = ["PRIMARY", "UNIQUE", "CHECK", "FOREIGN", "CONSTRAINT"];
-        if constraints
-            .iter()
-            .any(|word| name.eq_ignore_ascii_case(word))
-        {
+        if constraints.iter().any(|word| name.eq_ignore_ascii_case(word)) {
             continue;
         }
-        let rest: Vec<String> = (rest.split_whitespace())
-            .map(str::to_ascii_uppercase)
-            .collect();
+        let rest: Vec<String> = (rest.split_whitespace()).map(str::to_ascii_uppercase).collect();
         // Such a column is an alias of the row number.
         if rest.starts_with(&["INTEGER".to_owned(), "PRIMARY".to_owned(), "KEY".to_owned()]) {
             row_number = Some(columns.len());
@@ -432,7 +423,8 @@ mod tests {
 
     #[test]
     fn columns_are_told_from_constraints() {
-        let says = "CREATE TABLE \"m\"(id INTEGER PRIMARY KEY, \"topic_id\" INTEGER NOT NULL, n DECIMAL(3, 4), UNIQUE(id, n))";
+        let says =
+            "CREATE TABLE \"m\"(id INTEGER PRIMARY KEY, \"topic_id\" INTEGER NOT NULL, n DECIMAL(3, 4), UNIQUE(id, n))";
         let (columns, row_number) = columns_of(says);
         assert_eq!(columns, ["id", "topic_id", "n"]);
         assert_eq!(row_number, Some(0));

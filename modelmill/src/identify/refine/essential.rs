@@ -14,13 +14,7 @@ pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<R
         r_factor: triangle,
         ..
     } = found;
-    let kept = select_essential(
-        triangle,
-        solution,
-        deviations,
-        nominal,
-        &EssentialOptions::default(),
-    )?;
+    let kept = select_essential(triangle, solution, deviations, nominal, &EssentialOptions::default())?;
     solution.values = kept.values;
     solution.classical_std = kept.classical_std;
     solution.condition_number = kept.condition_number;
@@ -33,8 +27,5 @@ pub(super) fn refine(found: &mut WeightedEstimate, nominal: &[f64]) -> Outcome<R
         .map(|(std, classical)| deviations.samples as f64 * (classical / std).powi(2))
         .collect();
     deviations.std = kept.std;
-    Ok(RefinementResult::Essential(
-        kept.dropped,
-        kept.residual_rise,
-    ))
+    Ok(RefinementResult::Essential(kept.dropped, kept.residual_rise))
 }

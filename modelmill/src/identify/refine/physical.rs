@@ -2,8 +2,8 @@
 //! positive definite, and base parameters are functions of the physical ones.
 
 use modelmill_identify::estimate::{
-    BaseMap, BodyMatrix, PhysicalParameters, WeightedEstimate, physical_parameters,
-    planar_pseudo_inertia, pseudo_inertia,
+    BaseMap, BodyMatrix, PhysicalParameters, WeightedEstimate, physical_parameters, planar_pseudo_inertia,
+    pseudo_inertia,
 };
 use modelmill_identify::{ParameterUncertainty, RFactor, RegressionSolution};
 use modelmill_spec::{ExactExpression, Mechanism, ModelSymbol, PartInertia, Sign};
@@ -16,11 +16,7 @@ use crate::model::Model;
 /// Takes the physical parameters that bodies can have and that fit the recordings best.
 ///
 /// Fails when no consistent parameters are found.
-pub(super) fn refine(
-    model: &Model,
-    found: &mut WeightedEstimate,
-    unknown: &[usize],
-) -> Outcome<RefinementResult> {
+pub(super) fn refine(model: &Model, found: &mut WeightedEstimate, unknown: &[usize]) -> Outcome<RefinementResult> {
     let WeightedEstimate {
         solution,
         uncertainty: deviations,
@@ -36,11 +32,7 @@ pub(super) fn refine(
     // Directions that the recordings do not determine are fixed by nominal values.
     solution.undetermined.clear();
     solution.determined = physical.base.iter().map(|_| true).collect();
-    Ok(RefinementResult::Physical(
-        Box::new(physical),
-        bodies,
-        before,
-    ))
+    Ok(RefinementResult::Physical(Box::new(physical), bodies, before))
 }
 
 /// Solves for physical parameters that bodies can have; also returns the names of the bodies.
@@ -147,11 +139,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
     for (k, lump) in mechanism.lumped_masses.iter().enumerate() {
         if has_parameter(&lump.mass) {
             bodies.push(BodyMatrix {
-                name: format!(
-                    "lumped mass {} on {}",
-                    k + 1,
-                    mechanism.frames[lump.frame.0].name
-                ),
+                name: format!("lumped mass {} on {}", k + 1, mechanism.frames[lump.frame.0].name),
                 matrix: Box::new(|x: &[f64]| scalar_matrix(value(mechanism, &lump.mass, x))),
                 copies: 1.0,
             });
@@ -161,12 +149,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<BodyMatrix<'_>> {
 }
 
 /// Adds the constraints of one part; none if it has no parameter.
-fn add_part<'a>(
-    mechanism: &'a Mechanism,
-    name: &str,
-    inertial: &'a PartInertia,
-    bodies: &mut Vec<BodyMatrix<'a>>,
-) {
+fn add_part<'a>(mechanism: &'a Mechanism, name: &str, inertial: &'a PartInertia, bodies: &mut Vec<BodyMatrix<'a>>) {
     // Both ways of giving the inertia have a mass, a vector and a tensor.
     let (PartInertia::AboutCentre {
         mass,
@@ -193,9 +176,7 @@ fn add_part<'a>(
     let has_mass = !mass.is_zero();
     let diagonal = [0, 3, 5];
     // Axes with a moment of inertia that is not zero.
-    let moments: Vec<usize> = (0..3)
-        .filter(|axis| !inertia[diagonal[*axis]].is_zero())
-        .collect();
+    let moments: Vec<usize> = (0..3).filter(|axis| !inertia[diagonal[*axis]].is_zero()).collect();
     // The number of moments of inertia decides which constraint applies.
     match moments.as_slice() {
         // A point mass.
@@ -211,11 +192,7 @@ fn add_part<'a>(
                 name,
                 matrix: Box::new(move |x: &[f64]| {
                     let (m, h, i) = about_origin(mechanism, inertial, x);
-                    planar_pseudo_inertia(
-                        m,
-                        [h[(axis + 1) % 3], h[(axis + 2) % 3]],
-                        i[diagonal[axis]],
-                    )
+                    planar_pseudo_inertia(m, [h[(axis + 1) % 3], h[(axis + 2) % 3]], i[diagonal[axis]])
                 }),
                 copies: 2.0,
             });
@@ -251,11 +228,7 @@ fn add_part<'a>(
 }
 
 /// Mass, first moment and inertia about the frame's origin, at the parameters `x`.
-fn about_origin(
-    mechanism: &Mechanism,
-    inertial: &PartInertia,
-    x: &[f64],
-) -> (f64, [f64; 3], [f64; 6]) {
+fn about_origin(mechanism: &Mechanism, inertial: &PartInertia, x: &[f64]) -> (f64, [f64; 3], [f64; 6]) {
     // Both cases give the quantities about the origin of the frame.
     let get = |exact: &ExactExpression| value(mechanism, exact, x);
     match inertial {
@@ -268,22 +241,11 @@ fn about_origin(
             std::array::from_fn(|i| get(&first_moment[i])),
             std::array::from_fn(|i| get(&inertia[i])),
         ),
-        PartInertia::AboutCentre {
-            mass,
-            centre,
-            inertia,
-        } => {
+        PartInertia::AboutCentre { mass, centre, inertia } => {
             let m = get(mass);
             let [a, b, c]: [f64; 3] = std::array::from_fn(|i| get(&centre[i]));
             // Steiner's rule; off-diagonal entries are elements of the matrix.
-            let steiner = [
-                b * b + c * c,
-                -a * b,
-                -a * c,
-                a * a + c * c,
-                -b * c,
-                a * a + b * b,
-            ];
+            let steiner = [b * b + c * c, -a * b, -a * c, a * a + c * c, -b * c, a * a + b * b];
             (
                 m,
                 [m * a, m * b, m * c],

@@ -36,12 +36,7 @@ pub(super) fn refine(
             prior
         )));
     }
-    (found.solution, found.uncertainty) = solve_with_prior(
-        &found.r_factor,
-        &found.solution,
-        &found.uncertainty,
-        nominal,
-        &beliefs,
-    )?;
+    (found.solution, found.uncertainty) =
+        solve_with_prior(&found.r_factor, &found.solution, &found.uncertainty, nominal, &beliefs)?;
     Ok(RefinementResult::Prior(sigma, beliefs.len()))
 }

@@ -24,18 +24,11 @@ pub(super) struct NamedDriveLine<'a> {
 /// Variables that move two frames relative to each other: those on the paths to their common ancestor.
 pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2]) -> Vec<usize> {
     // From each frame up to the base.
-    let paths = frames.map(|frame| -> Vec<usize> {
-        std::iter::successors(frame, |k| chain.nodes[*k].on).collect()
-    });
+    let paths = frames.map(|frame| -> Vec<usize> { std::iter::successors(frame, |k| chain.nodes[*k].on).collect() });
     // Frames above the common ancestor move both ends alike.
-    let own = |a: &[usize], b: &[usize]| -> Vec<usize> {
-        a.iter().copied().filter(|k| !b.contains(k)).collect()
-    };
+    let own = |a: &[usize], b: &[usize]| -> Vec<usize> { a.iter().copied().filter(|k| !b.contains(k)).collect() };
     let [one, other] = [own(&paths[0], &paths[1]), own(&paths[1], &paths[0])];
-    let moves = one
-        .iter()
-        .chain(&other)
-        .flat_map(|k| &chain.nodes[*k].moves);
+    let moves = one.iter().chain(&other).flat_map(|k| &chain.nodes[*k].moves);
     moves.filter_map(|motion| motion.variable).collect()
 }
 
@@ -43,12 +36,7 @@ pub(super) fn relative_variables(chain: &FrameChain, frames: [Option<usize>; 2])
 /// of augmenting paths (H. W. Kuhn 1955).
 fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
     /// Whether a coordinate can be assigned to `line`, if necessary by moving other lines to another coordinate.
-    fn finds(
-        line: usize,
-        wanted: &[Vec<usize>],
-        tried: &mut Vec<usize>,
-        of: &mut [Option<usize>],
-    ) -> bool {
+    fn finds(line: usize, wanted: &[Vec<usize>], tried: &mut Vec<usize>, of: &mut [Option<usize>]) -> bool {
         for k in &wanted[line] {
             if tried.contains(k) {
                 continue;
@@ -73,8 +61,7 @@ fn match_lines(wanted: &[Vec<usize>]) -> Vec<Option<usize>> {
 impl ModelTextBuilder<'_> {
     /// The frames of both ends of a line; none is the base.
     pub(super) fn frames_of(&self, line: &StraightDrive) -> [Option<usize>; 2] {
-        line.ends
-            .map(|(link, _)| link.and_then(|link| self.links[link].0))
+        line.ends.map(|(link, _)| link.and_then(|link| self.links[link].0))
     }
 
     /// Assigns to each line an independent coordinate that has no other drive, and returns the lines that become
@@ -106,8 +93,7 @@ impl ModelTextBuilder<'_> {
         // The largest number of lines that can be drives at the same time.
         let wanted: Vec<Vec<usize>> = lines.iter().map(drives).collect();
         let driven = match_lines(&wanted);
-        let (mut kept, mut over): (Vec<&StraightDrive>, Vec<&StraightDrive>) =
-            (Vec::new(), Vec::new());
+        let (mut kept, mut over): (Vec<&StraightDrive>, Vec<&StraightDrive>) = (Vec::new(), Vec::new());
         for (line, driven) in lines.iter().zip(driven) {
             match driven {
                 Some(k) => {
@@ -118,8 +104,7 @@ impl ModelTextBuilder<'_> {
             }
         }
         // In a tree with all coordinates driven, further drives are surplus drives.
-        let all_driven =
-            closed.is_none() && (self.coordinates.iter()).all(|one| one.is_driven || one.is_pulled);
+        let all_driven = closed.is_none() && (self.coordinates.iter()).all(|one| one.is_driven || one.is_pulled);
         for line in over {
             if all_driven {
                 self.has_surplus = true;
@@ -176,11 +161,7 @@ impl ModelTextBuilder<'_> {
 
     /// Adds drives, effects and force limits of the lines to those of the joints. With surplus drives, effects and
     /// limits are left out with a remark.
-    pub(super) fn line_forces(
-        &mut self,
-        lines: &[NamedDriveLine<'_>],
-        [drives, effects, forces]: [&mut String; 3],
-    ) {
+    pub(super) fn line_forces(&mut self, lines: &[NamedDriveLine<'_>], [drives, effects, forces]: [&mut String; 3]) {
         for NamedDriveLine {
             line,
             name: place,
@@ -221,10 +202,8 @@ impl ModelTextBuilder<'_> {
         }
         if self.has_surplus && !forces.is_empty() {
             forces.clear();
-            self.remarks.push(
-                "limits of forces are left out: there are more drives than degrees of freedom"
-                    .into(),
-            );
+            self.remarks
+                .push("limits of forces are left out: there are more drives than degrees of freedom".into());
         }
     }
 }

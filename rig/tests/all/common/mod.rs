@@ -33,10 +33,7 @@ pub(crate) fn bundled(name: &str) -> Table {
     let path = workspace("recordings/spidermill-mbs").join(format!("{name}.csv"));
     let mut reader = csv::Reader::from_path(path).expect("a recording");
     let names = reader.headers().expect("a header").clone();
-    let mut table: Table = names
-        .iter()
-        .map(|name| (name.to_owned(), Vec::new()))
-        .collect();
+    let mut table: Table = names.iter().map(|name| (name.to_owned(), Vec::new())).collect();
     for record in reader.records() {
         for ((_, values), field) in table.iter_mut().zip(&record.expect("a record")) {
             values.push(field.parse().expect("a number"));
@@ -73,19 +70,13 @@ pub(crate) fn trajectory(table: &Table, coordinates: &[&str]) -> Trajectory {
 /// Root mean square of the difference over that of the expected values.
 pub(crate) fn relative_rms(found: &[f64], expected: &[f64]) -> f64 {
     assert_eq!(found.len(), expected.len());
-    let error: f64 = found
-        .iter()
-        .zip(expected)
-        .map(|(x, y)| (x - y).powi(2))
-        .sum();
+    let error: f64 = found.iter().zip(expected).map(|(x, y)| (x - y).powi(2)).sum();
     (error / expected.iter().map(|y| y * y).sum::<f64>()).sqrt()
 }
 
 /// Forces of the drives in a state.
 pub(crate) fn force(rig: &Rig, tracker: &mut RigTracker<'_>, state: &RigState) -> Vec<f64> {
-    let motion = tracker
-        .follow(state)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let motion = tracker.follow(state).unwrap_or_else(|error| panic!("{error}"));
     forces(rig, &motion).unwrap_or_else(|error| panic!("{error}"))
 }
 

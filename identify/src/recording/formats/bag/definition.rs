@@ -111,11 +111,7 @@ impl RosNumberType {
 /// Parses the definition of the message `name` in `text`, and those of the messages in it.
 ///
 /// Fails when a definition is missing or a line cannot be parsed.
-pub(super) fn parse_definition(
-    name: &str,
-    text: &str,
-    ros: RosVersion,
-) -> Result<Rc<RosMessageDefinition>, String> {
+pub(super) fn parse_definition(name: &str, text: &str, ros: RosVersion) -> Result<Rc<RosMessageDefinition>, String> {
     let own = short_type_name(name);
     let mut texts = BTreeMap::new();
     // Split the text at the lines of `=` into one list of lines per type.
@@ -123,9 +119,7 @@ pub(super) fn parse_definition(
     for line in text.lines() {
         let trimmed = line.trim();
         if trimmed.len() >= 3 && trimmed.bytes().all(|byte| byte == b'=') {
-            texts
-                .entry(current)
-                .or_insert_with(|| std::mem::take(&mut lines));
+            texts.entry(current).or_insert_with(|| std::mem::take(&mut lines));
             lines.clear();
             current = String::new();
         } else if let (true, Some(name)) = (current.is_empty(), trimmed.strip_prefix("MSG:")) {
@@ -161,11 +155,7 @@ struct RosDefinitionParser<'a> {
 
 impl RosDefinitionParser<'_> {
     /// Parses the definition of one type; `depth` is its nesting.
-    fn parse_message(
-        &mut self,
-        name: &str,
-        depth: usize,
-    ) -> Result<Rc<RosMessageDefinition>, String> {
+    fn parse_message(&mut self, name: &str, depth: usize) -> Result<Rc<RosMessageDefinition>, String> {
         if let Some(done) = self.done.get(name) {
             return Ok(done.clone());
         }
@@ -206,10 +196,7 @@ impl RosDefinitionParser<'_> {
             if end == 0 {
                 return Err(format!("the line `{line}` of `{name}` cannot be read"));
             }
-            fields.push((
-                rest[..end].to_owned(),
-                self.parse_field_type(kind, name, depth)?,
-            ));
+            fields.push((rest[..end].to_owned(), self.parse_field_type(kind, name, depth)?));
         }
         let definition = Rc::new(RosMessageDefinition { fields });
         self.done.insert(name.to_owned(), definition.clone());
@@ -217,17 +204,9 @@ impl RosDefinitionParser<'_> {
     }
 
     /// Parses the type of a field in the message `within`.
-    fn parse_field_type(
-        &mut self,
-        text: &str,
-        within: &str,
-        depth: usize,
-    ) -> Result<RosFieldType, String> {
+    fn parse_field_type(&mut self, text: &str, within: &str, depth: usize) -> Result<RosFieldType, String> {
         // `type[]`, `type[n]` and `type[<=n]` are lists; the last one has a variable length.
-        if let Some((of, length)) = text
-            .strip_suffix(']')
-            .and_then(|text| text.rsplit_once('['))
-        {
+        if let Some((of, length)) = text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
             let of = self.parse_field_type(of, within, depth)?;
             let length = match length {
                 "" => None,
@@ -249,9 +228,7 @@ impl RosDefinitionParser<'_> {
         match (bare, self.ros) {
             ("string", _) => return Ok(RosFieldType::Text),
             ("wstring", _) => {
-                return Err(format!(
-                    "`{within}` contains a `wstring`, which is not supported"
-                ));
+                return Err(format!("`{within}` contains a `wstring`, which is not supported"));
             }
             ("time", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: false }),
             ("duration", RosVersion::One) => return Ok(RosFieldType::Time { is_signed: true }),
@@ -282,10 +259,7 @@ fn well_known_definition(name: &str) -> Option<&'static str> {
 
 /// Common types and the texts of their definitions.
 const WELL_KNOWN: [(&str, &str); 22] = [
-    (
-        "std_msgs/Header",
-        "builtin_interfaces/Time stamp\nstring frame_id",
-    ),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
     ("std_msgs/Bool", "bool data"),
     ("std_msgs/Int32", "int32 data"),
     ("std_msgs/Int64", "int64 data"),
@@ -302,28 +276,16 @@ const WELL_KNOWN: [(&str, &str); 22] = [
         "std_msgs/MultiArrayLayout",
         "MultiArrayDimension[] dim\nuint32 data_offset",
     ),
-    (
-        "std_msgs/Float32MultiArray",
-        "MultiArrayLayout layout\nfloat32[] data",
-    ),
-    (
-        "std_msgs/Float64MultiArray",
-        "MultiArrayLayout layout\nfloat64[] data",
-    ),
+    ("std_msgs/Float32MultiArray", "MultiArrayLayout layout\nfloat32[] data"),
+    ("std_msgs/Float64MultiArray", "MultiArrayLayout layout\nfloat64[] data"),
     (
         "sensor_msgs/JointState",
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
     ),
     ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
-    (
-        "geometry_msgs/Quaternion",
-        "float64 x\nfloat64 y\nfloat64 z\nfloat64 w",
-    ),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
     ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque"),
-    (
-        "geometry_msgs/WrenchStamped",
-        "std_msgs/Header header\nWrench wrench",
-    ),
+    ("geometry_msgs/WrenchStamped", "std_msgs/Header header\nWrench wrench"),
     (
         "sensor_msgs/Imu",
         "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n\

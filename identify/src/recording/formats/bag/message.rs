@@ -39,18 +39,13 @@ pub(super) struct RosMessageReader {
 impl RosMessageReader {
     /// Finds the field of the time: `stamp`, or a `header` that contains it.
     pub(super) fn new(definition: Rc<RosMessageDefinition>, ros: RosVersion) -> Self {
-        let is_time = |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
+        let is_time =
+            |field: &(String, RosFieldType)| matches!(field, (name, RosFieldType::Time { .. }) if name == "stamp");
         let stamp = definition.fields.iter().position(|field| match field {
-            (name, RosFieldType::Message(header)) if name == "header" => {
-                header.fields.iter().any(is_time)
-            }
+            (name, RosFieldType::Message(header)) if name == "header" => header.fields.iter().any(is_time),
             other => is_time(other),
         });
-        Self {
-            definition,
-            ros,
-            stamp,
-        }
+        Self { definition, ros, stamp }
     }
 
     /// Reads a message into `content`, whose earlier contents are dropped.
@@ -165,18 +160,13 @@ enum RosValue<'a> {
 }
 
 /// Decodes a value for the names of its columns.
-fn value_of<'a>(
-    kind: &'a RosFieldType,
-    bytes: &mut RosByteReader<'_>,
-) -> Result<RosValue<'a>, String> {
+fn value_of<'a>(kind: &'a RosFieldType, bytes: &mut RosByteReader<'_>) -> Result<RosValue<'a>, String> {
     Ok(match kind {
         RosFieldType::Number(number) => {
             bytes.read_number(*number)?;
             RosValue::Number(number.name())
         }
-        RosFieldType::Text => {
-            RosValue::Text(String::from_utf8_lossy(bytes.read_text()?).into_owned())
-        }
+        RosFieldType::Text => RosValue::Text(String::from_utf8_lossy(bytes.read_text()?).into_owned()),
         RosFieldType::Time { is_signed } => {
             bytes.read_time(*is_signed)?;
             RosValue::Number("time")
@@ -209,10 +199,7 @@ impl RosValue<'_> {
             Self::Text(_) | Self::Skipped => {}
             Self::Message(fields) => {
                 // Lists of texts in this message may name the elements of its other lists.
-                let mut known: Vec<Vec<String>> = fields
-                    .iter()
-                    .filter_map(|(_, value)| value.list_texts())
-                    .collect();
+                let mut known: Vec<Vec<String>> = fields.iter().filter_map(|(_, value)| value.list_texts()).collect();
                 known.extend(names.iter().cloned());
                 for (name, value) in fields {
                     let path = if path.is_empty() {
@@ -225,10 +212,7 @@ impl RosValue<'_> {
             }
             Self::List(values) => {
                 // Names of the elements themselves take precedence.
-                let own = values
-                    .iter()
-                    .map(Self::own_name)
-                    .collect::<Option<Vec<_>>>();
+                let own = values.iter().map(Self::own_name).collect::<Option<Vec<_>>>();
                 let own = own.filter(|own| are_unique_names(own));
                 // Then lists of names of the same length, and at the end positions from 1.
                 let beside = names.iter().find(|names| names.len() == values.len());
@@ -270,8 +254,7 @@ impl RosValue<'_> {
 
 /// Whether texts are not empty and differ from each other.
 fn are_unique_names(texts: &[String]) -> bool {
-    !texts.is_empty()
-        && (0..texts.len()).all(|i| !texts[i].is_empty() && !texts[..i].contains(&texts[i]))
+    !texts.is_empty() && (0..texts.len()).all(|i| !texts[i].is_empty() && !texts[..i].contains(&texts[i]))
 }
 
 /// Reads the bytes of a message in order.

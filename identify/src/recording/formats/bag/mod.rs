@@ -144,22 +144,13 @@ impl<'a> BagCollector<'a> {
     }
 
     /// Registers a topic. The result identifies it in [`Self::take_message`].
-    pub(super) fn register_topic(
-        &mut self,
-        name: &str,
-        kind: &str,
-        encoding: &BagEncoding<'_>,
-    ) -> usize {
+    pub(super) fn register_topic(&mut self, name: &str, kind: &str, encoding: &BagEncoding<'_>) -> usize {
         // Encoding and definition decide the version of ROS.
         let ros = match (encoding.messages, encoding.definition) {
             ("cdr", "ros2msg" | "") => Ok(RosVersion::Two),
             ("ros1", "ros1msg") => Ok(RosVersion::One),
-            ("cdr" | "ros1", other) => Err(format!(
-                "its definition is `{other}`, which is not supported"
-            )),
-            (other, _) => Err(format!(
-                "its messages are encoded as `{other}`, which is not supported"
-            )),
+            ("cdr" | "ros1", other) => Err(format!("its definition is `{other}`, which is not supported")),
+            (other, _) => Err(format!("its messages are encoded as `{other}`, which is not supported")),
         };
         // A topic that cannot be read is kept with the reason and reported only if it is listed.
         let reader = ros.and_then(|ros| {
@@ -184,12 +175,7 @@ impl<'a> BagCollector<'a> {
     ///
     /// Fails when it cannot be read although earlier messages of its topic could be, or when too many numbers would
     /// be kept.
-    pub(super) fn take_message(
-        &mut self,
-        topic: usize,
-        log: i64,
-        bytes: &[u8],
-    ) -> Result<(), RecordingFault> {
+    pub(super) fn take_message(&mut self, topic: usize, log: i64, bytes: &[u8]) -> Result<(), RecordingFault> {
         let topic = &mut self.topics[topic];
         topic.count += 1;
         let Ok(reader) = &topic.reader else {
@@ -296,19 +282,14 @@ impl BagTopic {
             return Err("it has more columns than any recording".to_owned());
         }
         // Another shape may have the same columns.
-        let known = self
-            .layouts
-            .iter()
-            .position(|layout| layout.places == places);
+        let known = self.layouts.iter().position(|layout| layout.places == places);
         // A new form is registered in all of its columns.
         let layout = known.unwrap_or_else(|| {
             for place in &places {
                 self.columns[*place].layouts.insert(self.layouts.len());
             }
             self.layouts.push(BagMessageLayout {
-                is_kept: places
-                    .iter()
-                    .any(|place| self.columns[*place].values.is_some()),
+                is_kept: places.iter().any(|place| self.columns[*place].values.is_some()),
                 places,
                 count: 0,
                 log: None,
@@ -333,10 +314,7 @@ impl BagTopic {
         // Columns with the same set of forms belong to one table.
         let mut tables: IndexMap<BTreeSet<usize>, Vec<(String, TopicColumn)>> = IndexMap::new();
         for (name, column) in self.columns {
-            tables
-                .entry(column.layouts.clone())
-                .or_default()
-                .push((name, column));
+            tables.entry(column.layouts.clone()).or_default().push((name, column));
         }
         // Publishers without a clock leave the time at zero.
         let has_stamps = self.layouts.iter().all(|layout| layout.has_stamps);
@@ -358,9 +336,7 @@ impl BagTopic {
             let forms = || layouts.iter().map(|layout| &self.layouts[*layout]);
             // The time range covers all messages, also those that are not kept.
             let mut span = None;
-            for (first, last) in
-                forms().filter_map(|form| if has_stamps { form.stamp } else { form.log })
-            {
+            for (first, last) in forms().filter_map(|form| if has_stamps { form.stamp } else { form.log }) {
                 extend_span(&mut span, first);
                 extend_span(&mut span, last);
             }
@@ -381,15 +357,10 @@ impl BagTopic {
 }
 
 /// A function that passes all messages of a log to a collector.
-pub(super) type BagReplay<'a> =
-    &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
+pub(super) type BagReplay<'a> = &'a mut dyn FnMut(&mut BagCollector<'_>) -> Result<(), RecordingFault>;
 
 /// Reads a log: the needed columns, joined on time.
-pub(super) fn read(
-    show: BagReplay<'_>,
-    file: &str,
-    options: &ReadOptions,
-) -> Result<SignalRecording, RecordingFault> {
+pub(super) fn read(show: BagReplay<'_>, file: &str, options: &ReadOptions) -> Result<SignalRecording, RecordingFault> {
     // Numbers of needed columns are kept while the messages are read.
     let is_kept = |name: &str| options.is_column_needed(name);
     let mut bag = BagCollector::new(&is_kept, options.max_numbers);
@@ -486,11 +457,7 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
         let tables = topic.tables();
         // A topic without numbers has no table.
         if tables.is_empty() {
-            let holds = if bare.samples == 0 {
-                "no messages"
-            } else {
-                "no numbers"
-            };
+            let holds = if bare.samples == 0 { "no messages" } else { "no numbers" };
             found.push(TableInfo {
                 remark: Some(format!("it contains {holds}")),
                 ..bare
@@ -502,10 +469,7 @@ pub(super) fn tables(show: BagReplay<'_>) -> Result<Vec<TableInfo>, RecordingFau
             let span = table.span.map(|(least, most)| {
                 let is_exact = -EXACT < least && most < EXACT;
                 let zero = if is_exact { 0 } else { least };
-                (
-                    seconds(least.wrapping_sub(zero)),
-                    seconds(most.wrapping_sub(zero)),
-                )
+                (seconds(least.wrapping_sub(zero)), seconds(most.wrapping_sub(zero)))
             });
             let columns = table.columns.into_iter().map(|(name, kind, _)| ColumnInfo {
                 name,

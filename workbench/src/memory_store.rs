@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use modelmill::files::{FileError, FileSource, MemoryFiles, OpenFile, PathKind};
 use serde_json::Value;
 
-use crate::surroundings::SessionEnvironment;
+use crate::surrounding_files::SessionEnvironment;
 
 /// Files in memory, a clock, and a listener for progress. Clones share the files.
 #[derive(Clone)]
@@ -76,8 +76,8 @@ impl SessionEnvironment for MemoryStore {
         // Only the page itself makes changes, and it gets them as responses.
     }
 
-    fn report_progress(&self, told: &Value) {
-        (self.goes_on)(told);
+    fn report_progress(&self, view_json: &Value) {
+        (self.goes_on)(view_json);
     }
 
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String> {

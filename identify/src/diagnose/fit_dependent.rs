@@ -16,10 +16,7 @@ use super::problem::{CandidateEffect, ColumnSource, LoadDependentQuery};
 
 impl EffectSelector<'_> {
     /// Load-dependent candidates by index, with the columns for the load of a set's fit.
-    pub(crate) fn load_dependent_effects(
-        &mut self,
-        picks: &[SelectedEffect],
-    ) -> HashMap<usize, SelectedEffect> {
+    pub(crate) fn load_dependent_effects(&mut self, picks: &[SelectedEffect]) -> HashMap<usize, SelectedEffect> {
         // Without load-dependent candidates the load is not needed.
         let is_carried = |c: &CandidateEffect| matches!(c.source, ColumnSource::LoadDependent);
         if !self.problem.candidates.iter().any(is_carried) {
@@ -49,9 +46,7 @@ impl EffectSelector<'_> {
         // Columns with their factors; friction of the drives behind them is dropped.
         let parts = which[..n].iter().copied().zip(factors.iter().copied());
         let parts = parts.zip(is_part_of_load);
-        self.sum_columns(
-            parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)),
-        )
+        self.sum_columns(parts.filter_map(|(part, is_part_of_load)| is_part_of_load.then_some(part)))
     }
 
     /// The same with the other friction of the set included: no model states which friction lies between load and
@@ -93,9 +88,7 @@ impl EffectSelector<'_> {
                 candidate,
                 constants: choice.constants,
                 rank: choice.columns.len(),
-                columns: (choice.columns.into_iter())
-                    .map(|c| self.pool.add(c))
-                    .collect(),
+                columns: (choice.columns.into_iter()).map(|c| self.pool.add(c)).collect(),
             };
             (candidate, pick)
         });
@@ -156,16 +149,10 @@ impl EffectSelector<'_> {
                         force.add(*factor, self.pool.column(*k));
                     }
                 }
-                vec![self.reading_fault_column(
-                    *reading,
-                    &force,
-                    found.map_or(0.0, |value| value[0]),
-                )]
+                vec![self.reading_fault_column(*reading, &force, found.map_or(0.0, |value| value[0]))]
             }
             // Body: derivatives at the estimated centre.
-            ColumnSource::Body(body) => {
-                body.columns(found.map_or([0.0; 3], |values| body.centre(&values)))
-            }
+            ColumnSource::Body(body) => body.columns(found.map_or([0.0; 3], |values| body.centre(&values))),
             // Constant: secant between no error and the estimated error.
             ColumnSource::Constant(constant) => {
                 // Without an estimate yet, the derivative is used.
@@ -187,11 +174,7 @@ impl EffectSelector<'_> {
     }
 
     /// A load-dependent member, with or without friction in the load, whichever explains more; its constant stays.
-    fn best_load_dependent(
-        &mut self,
-        picks: &[SelectedEffect],
-        member: usize,
-    ) -> Option<SelectedEffect> {
+    fn best_load_dependent(&mut self, picks: &[SelectedEffect], member: usize) -> Option<SelectedEffect> {
         let candidate = picks[member].candidate;
         let value = picks[member].constants.first().map(|(_, value)| *value);
         let which = LoadDependentQuery::One(candidate, value);
@@ -210,18 +193,12 @@ impl EffectSelector<'_> {
     }
 
     /// Computes the columns that depend on the fit again; three rounds, since each fit changes them a little.
-    pub(crate) fn refresh_columns(
-        &mut self,
-        mut picks: Vec<SelectedEffect>,
-    ) -> Vec<SelectedEffect> {
+    pub(crate) fn refresh_columns(&mut self, mut picks: Vec<SelectedEffect>) -> Vec<SelectedEffect> {
         let known = self.pool.len();
         for _ in 0..3 {
             for i in 0..picks.len() {
                 let candidate = picks[i].candidate;
-                if matches!(
-                    self.problem.candidates[candidate].source,
-                    ColumnSource::Columns(_)
-                ) {
+                if matches!(self.problem.candidates[candidate].source, ColumnSource::Columns(_)) {
                     continue;
                 }
                 // Later members use the new columns of earlier ones.
@@ -256,11 +233,7 @@ impl EffectSelector<'_> {
     }
 
     /// Releases the columns that were added from an index on, except those of some effects; indices do not change.
-    pub(crate) fn drop_columns_since<'p>(
-        &mut self,
-        known: usize,
-        but: impl IntoIterator<Item = &'p SelectedEffect>,
-    ) {
+    pub(crate) fn drop_columns_since<'p>(&mut self, known: usize, but: impl IntoIterator<Item = &'p SelectedEffect>) {
         // Indices that must stay valid.
         let kept: HashSet<usize> = (but.into_iter())
             .flat_map(|pick| pick.columns.iter().copied())

@@ -111,9 +111,7 @@ fn entry(found: &IdentifiedEffect, kind: &EffectKind, answer: &DiagnosisSolution
                     .push((constant.to_owned(), round_significant(value / of)));
             }
         } else if kind.constants.iter().any(|c| c.symbol == symbol) {
-            effect
-                .constants
-                .push((symbol.to_owned(), round_significant(*value)));
+            effect.constants.push((symbol.to_owned(), round_significant(*value)));
         } else if kind.parameters.iter().any(|p| p.symbol == symbol) {
             effect.parameters.push(NewParameter {
                 symbol: symbol.to_owned(),
@@ -189,10 +187,7 @@ mod tests {
 
     #[test]
     fn what_acts_twice_at_a_place_is_added_up_there() {
-        let made = split_shared_places(vec![
-            friction(&["a", "b", "c"], 25.0),
-            friction(&["c"], 15.0),
-        ]);
+        let made = split_shared_places(vec![friction(&["a", "b", "c"], 25.0), friction(&["c"], 15.0)]);
         assert_eq!(made, [friction(&["a", "b"], 25.0), friction(&["c"], 40.0)]);
         // The force at each place is what it was, whatever the order.
         let made = split_shared_places(vec![

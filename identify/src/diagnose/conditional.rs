@@ -58,20 +58,13 @@ impl EffectSelector<'_> {
     }
 
     /// The same for columns that are not in the pool.
-    pub(crate) fn explained_by_columns(
-        &self,
-        columns: &[ForceColumn],
-        beside: &ConditioningSet,
-    ) -> f64 {
-        let product =
-            |a: &ForceColumn, b: &ForceColumn| self.pool.weighted_product_of(a, b, &self.weights);
+    pub(crate) fn explained_by_columns(&self, columns: &[ForceColumn], beside: &ConditioningSet) -> f64 {
+        let product = |a: &ForceColumn, b: &ForceColumn| self.pool.weighted_product_of(a, b, &self.weights);
         let in_pool = |k: usize| self.pool.column(k);
         let (n, m) = (columns.len(), beside.columns.len());
         beside.explained_squares(&InnerProductBlocks {
             own: DMatrix::from_fn(n, n, |i, j| product(&columns[i], &columns[j])),
-            with_set: DMatrix::from_fn(m, n, |i, j| {
-                product(in_pool(beside.columns[i]), &columns[j])
-            }),
+            with_set: DMatrix::from_fn(m, n, |i, j| product(in_pool(beside.columns[i]), &columns[j])),
             measured: DVector::from_fn(n, |i, _| product(in_pool(self.measured), &columns[i])),
         })
     }
@@ -98,12 +91,7 @@ impl EffectSelector<'_> {
     }
 
     /// Whether all columns of `some` lie in the span of `others` and a set.
-    pub(crate) fn is_in_joint_span(
-        &self,
-        some: &[usize],
-        others: &[usize],
-        beside: &ConditioningSet,
-    ) -> bool {
+    pub(crate) fn is_in_joint_span(&self, some: &[usize], others: &[usize], beside: &ConditioningSet) -> bool {
         let all = [others, some].concat();
         let products = self.products_of(&all, beside);
         let left = beside.project_out_set(&products);

@@ -2,20 +2,16 @@
 //! Output are its columns along recordings.
 
 use modelmill_codegen::ModelEvaluator;
-use modelmill_identify::diagnose::{
-    CandidateEffect, ColumnChoice, ColumnSource, ForceColumn, LocatedEffect,
-};
+use modelmill_identify::diagnose::{CandidateEffect, ColumnChoice, ColumnSource, ForceColumn, LocatedEffect};
 use modelmill_spec::edit::NewEffect;
-use modelmill_spec::{
-    ActsOn, ConstantSearch, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism,
-};
+use modelmill_spec::{ActsOn, ConstantSearch, DriveKind, EffectKind, EffectPlace, Mechanics, Mechanism};
 
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 
 use super::candidates::{
-    CandidateEntry, CandidateVariant, ChangeCandidate, DerivedCandidates, derive_tilt,
-    is_load_dependent, single_candidate,
+    CandidateEntry, CandidateVariant, ChangeCandidate, DerivedCandidates, derive_tilt, is_load_dependent,
+    single_candidate,
 };
 use super::columns::{candidate_columns, load_dependent_columns};
 use super::places::{CandidatePlace, candidate_places};
@@ -54,10 +50,7 @@ impl NamedEffect {
             .next()
             .and_then(|effect| effect.split_once('@'))
             .ok_or_else(expected)?;
-        let at: Vec<String> = places
-            .split(',')
-            .map(|place| place.trim().to_owned())
-            .collect();
+        let at: Vec<String> = places.split(',').map(|place| place.trim().to_owned()).collect();
         if kind.trim().is_empty() || at.iter().any(String::is_empty) {
             return Err(expected());
         }
@@ -109,11 +102,7 @@ pub(crate) struct ChosenEffect {
 /// Derives a named effect.
 ///
 /// Fails, as `add` would, if kind, place or value is unknown or the model has the effect already.
-pub(crate) fn derive_effect(
-    model: &Model,
-    named: &NamedEffect,
-    constants: ConstantPolicy,
-) -> Outcome<ChosenEffect> {
+pub(crate) fn derive_effect(model: &Model, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<ChosenEffect> {
     let loaded = &model.loaded;
     check_effect(model, named)?;
     let mechanism = &loaded.mechanism;
@@ -131,9 +120,8 @@ pub(crate) fn derive_effect(
     // Stage 1: find the places by their names.
     let of_kind = named.effect.at.iter().enumerate().map(|(k, place)| {
         // The second place of a kind is only an argument of its expression; the effect does not act there.
-        let moves = |one: &&CandidatePlace| {
-            one.name == *place && matches!(one.sort, ActsOn::Drive | ActsOn::Coordinate)
-        };
+        let moves =
+            |one: &&CandidatePlace| one.name == *place && matches!(one.sort, ActsOn::Drive | ActsOn::Coordinate);
         match all.iter().find(moves) {
             Some(other) if k > 0 && kind.other.is_some() => Ok(other.clone()),
             _ => find_place(mechanism, &kind, &all, place),
@@ -214,11 +202,7 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
         }
         // A constant without a value is searched for later, so any value will do for this check.
         for one in kind.constants.iter().filter(|c| c.value.is_none()) {
-            if effect
-                .constants
-                .iter()
-                .all(|(symbol, _)| *symbol != one.symbol)
-            {
+            if effect.constants.iter().all(|(symbol, _)| *symbol != one.symbol) {
                 effect.constants.push((one.symbol.clone(), 1.0));
             }
         }
@@ -232,12 +216,7 @@ fn check_effect(model: &Model, named: &NamedEffect) -> Outcome {
 ///
 /// Fails when the kind has no effect at the place; the message names the drive if the name is that of its
 /// joint.
-fn find_place(
-    mechanism: &Mechanism,
-    kind: &EffectKind,
-    all: &[CandidatePlace],
-    name: &str,
-) -> Outcome<CandidatePlace> {
+fn find_place(mechanism: &Mechanism, kind: &EffectKind, all: &[CandidatePlace], name: &str) -> Outcome<CandidatePlace> {
     // The kind must be able to act at the place.
     let suits = |spot: &&CandidatePlace| spot.name == name && kind.on.contains(&spot.sort);
     if let Some(spot) = all.iter().find(suits) {
@@ -255,35 +234,22 @@ fn find_place(
         ),
         _ => "it has no effect there".to_owned(),
     };
-    Err(Error::input(format!(
-        "`{}` at `{name}`: {advice}",
-        kind.name
-    )))
+    Err(Error::input(format!("`{}` at `{name}`: {advice}", kind.name)))
 }
 
 /// Constants with a value: given ones and, if none are searched for, default ones. Constants that enter
 /// linearly, such as the neutral position of a spring, are always estimated with the parameters.
 ///
 /// Fails when a constant has neither a value nor a default.
-fn fixed_constants(
-    kind: &EffectKind,
-    named: &NamedEffect,
-    constants: ConstantPolicy,
-) -> Outcome<Vec<(String, f64)>> {
+fn fixed_constants(kind: &EffectKind, named: &NamedEffect, constants: ConstantPolicy) -> Outcome<Vec<(String, f64)>> {
     let mut given = Vec::new();
     for constant in &kind.constants {
         if constant.search == Some(ConstantSearch::Linear) {
             continue;
         }
-        let said = named
-            .values
-            .iter()
-            .find(|(symbol, _)| *symbol == constant.symbol);
+        let said = named.values.iter().find(|(symbol, _)| *symbol == constant.symbol);
         // Defaults of the library are texts, which may be expressions.
-        let usual = constant
-            .value
-            .as_ref()
-            .and_then(|text| text.parse::<f64>().ok());
+        let usual = constant.value.as_ref().and_then(|text| text.parse::<f64>().ok());
         match (said, constants, constant.search, usual) {
             (Some((_, value)), ..) => given.push((constant.symbol.clone(), *value)),
             (None, ConstantPolicy::Usual, Some(_), Some(value)) => {
@@ -340,11 +306,8 @@ impl ChosenEffect {
             ColumnSource::Columns(choices) => choices.clone(),
             ColumnSource::LoadDependent => {
                 let tried = |single: usize| grids[single].clone();
-                let made =
-                    load_dependent_columns(&self.candidates, model, all, load, None, &tried)?;
-                made.into_iter()
-                    .next()
-                    .map_or_else(Vec::new, |(_, choices)| choices)
+                let made = load_dependent_columns(&self.candidates, model, all, load, None, &tried)?;
+                made.into_iter().next().map_or_else(Vec::new, |(_, choices)| choices)
             }
             // A tilt has one column for each axis: the change of all base columns times their nominal values.
             ColumnSource::Tilt(tilt) => {
@@ -360,9 +323,7 @@ impl ChosenEffect {
                 };
                 only(tilt.directions(&level).into_iter().map(sum).collect())
             }
-            ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => {
-                Vec::new()
-            }
+            ColumnSource::ReadingFault(_) | ColumnSource::Body(_) | ColumnSource::Constant(_) => Vec::new(),
         };
         Ok(Some((candidate, choices)))
     }

@@ -22,7 +22,7 @@ pub(crate) trait SessionEnvironment: Send + Sync {
     fn notify_change(&self, version: u64);
 
     /// Reports the current step of long work: an object with `what`, `done` and `total` (0 if unknown).
-    fn report_progress(&self, told: &Value);
+    fn report_progress(&self, view_json: &Value);
 
     /// Does long work, in parallel if the environment has threads; fails with a sentence if it cannot start.
     fn spawn_work(&self, work: Box<dyn FnOnce() + Send>) -> Result<(), String>;

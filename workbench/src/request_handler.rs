@@ -12,16 +12,16 @@ use serde::Deserialize;
 use serde_json::json;
 
 use crate::answers::{PageResponse, RequestRefusal, answer_request, parse_body};
+use crate::memory_store::MemoryStore;
 use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
-use crate::shelf::MemoryStore;
-use crate::sitting::WorkbenchSession;
+use crate::session::WorkbenchSession;
 
 /// A session in memory, and the files for the next one.
 pub struct RequestHandler {
     /// Files, clock and progress.
-    shelf: MemoryStore,
+    memory_store: MemoryStore,
     /// The open session, if any.
-    sitting: Option<Arc<WorkbenchSession>>,
+    session: Option<Arc<WorkbenchSession>>,
 }
 
 /// Body of the request `open`: names of files that were added before.
@@ -45,14 +45,14 @@ impl RequestHandler {
     /// `done`, `total`).
     pub fn new(seconds: fn() -> f64, goes_on: fn(&serde_json::Value)) -> Self {
         Self {
-            shelf: MemoryStore::new(seconds, goes_on),
-            sitting: None,
+            memory_store: MemoryStore::new(seconds, goes_on),
+            session: None,
         }
     }
 
     /// Adds a file, or replaces the file with this name.
     pub fn add_file(&mut self, name: &str, bytes: &[u8]) {
-        self.shelf.insert_file(Path::new(name), bytes);
+        self.memory_store.insert_file(Path::new(name), bytes);
     }
 
     /// Answers a request: JSON with the HTTP `status` of the server, and the response under `told`. `open` (`model`,
@@ -61,17 +61,17 @@ impl RequestHandler {
         let found = if question == "open" {
             self.open_session(body)
         } else {
-            match &self.sitting {
-                Some(sitting) => answer_request(sitting, question, body),
+            match &self.session {
+                Some(session) => answer_request(session, question, body),
                 None => Err("no model is open".to_owned().into()),
             }
         };
-        let (status, told) = match found {
-            Ok(PageResponse::Json(told)) => (200, told),
-            Ok(PageResponse::Svg(told) | PageResponse::Html(told)) => (200, json!(told)),
+        let (status, view_json) = match found {
+            Ok(PageResponse::Json(view_json)) => (200, view_json),
+            Ok(PageResponse::Svg(view_json) | PageResponse::Html(view_json)) => (200, json!(view_json)),
             Err(RequestRefusal(fault, says)) => (fault.status(), json!({ "says": says })),
         };
-        json!({ "status": status, "told": told }).to_string()
+        json!({ "status": status, "told": view_json }).to_string()
     }
 
     /// Opens a session on the files that were added; each recording is one file.
@@ -85,12 +85,12 @@ impl RequestHandler {
             first: asked.first,
             ..Options::default()
         };
-        let shelf = Arc::new(self.shelf.clone());
-        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageSpelling), shelf);
-        let sitting = Arc::new(opened.map_err(|error| error.to_string())?);
-        let told = sitting.view();
-        self.sitting = Some(sitting);
-        Ok(PageResponse::Json(told))
+        let memory_store = Arc::new(self.memory_store.clone());
+        let opened = WorkbenchSession::open(&Host::new(), options, Arc::new(PageSpelling), memory_store);
+        let session = Arc::new(opened.map_err(|error| error.to_string())?);
+        let view_json = session.view();
+        self.session = Some(session);
+        Ok(PageResponse::Json(view_json))
     }
 }
 
@@ -148,52 +148,49 @@ mod tests {
 
     use super::*;
 
-    fn told(answer: &str) -> (u64, Value) {
+    fn view_json(answer: &str) -> (u64, Value) {
         let mut answer: Value = serde_json::from_str(answer).unwrap();
-        let told = answer["told"].take();
-        (answer["status"].as_u64().unwrap(), told)
+        let view_json = answer["told"].take();
+        (answer["status"].as_u64().unwrap(), view_json)
     }
 
     #[test]
     fn a_desk_answers_as_the_server_does() {
-        let mut desk = RequestHandler::new(|| 0.0, |_| {});
-        assert_eq!(told(&desk.answer_request("view", b"")).0, 422);
+        let mut request_handler = RequestHandler::new(|| 0.0, |_| {});
+        assert_eq!(view_json(&request_handler.answer_request("view", b"")).0, 422);
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/");
         for name in ["delta.toml", "delta_tied.toml"] {
-            desk.add_file(name, &std::fs::read(format!("{folder}{name}")).unwrap());
+            request_handler.add_file(name, &std::fs::read(format!("{folder}{name}")).unwrap());
         }
         let (status, view) =
-            told(&desk.answer_request("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
+            view_json(&request_handler.answer_request("open", br#"{ "model": "delta_tied.toml", "first": 40 }"#));
         assert_eq!((status, &view["valid"]), (200, &json!(true)), "{view}");
-        assert_eq!(
-            (&view["revision"], &view["version"]),
-            (&json!(41), &json!(41))
-        );
+        assert_eq!((&view["revision"], &view["version"]), (&json!(41), &json!(41)));
         let edit = |base: u64, text: &str| json!({ "base": base, "text": text }).to_string();
-        let (status, fault) = told(&desk.answer_request("edit", edit(41, "schema = [").as_bytes()));
+        let (status, fault) = view_json(&request_handler.answer_request("edit", edit(41, "schema = [").as_bytes()));
         assert_eq!((status, &fault["valid"]), (200, &json!(false)));
         assert_eq!(fault["diagnostics"][0]["line"], 1, "{fault}");
         // Compared with the saved file, and with another model of the folder.
         let text = view["text"].as_str().unwrap();
-        let saved = desk.answer_request("edit", edit(42, text).as_bytes());
-        assert_eq!(told(&saved).1["valid"], true, "{saved}");
-        let (_, models) = told(&desk.answer_request("models", b"{}"));
+        let saved = request_handler.answer_request("edit", edit(42, text).as_bytes());
+        assert_eq!(view_json(&saved).1["valid"], true, "{saved}");
+        let (_, models) = view_json(&request_handler.answer_request("models", b"{}"));
         assert_eq!(models, json!({ "models": ["delta.toml"], "named": null }));
         for beside in [json!(null), json!("delta.toml")] {
             let body = json!({ "beside": beside }).to_string();
-            let (status, variant) = told(&desk.answer_request("variant", body.as_bytes()));
+            let (status, variant) = view_json(&request_handler.answer_request("variant", body.as_bytes()));
             assert_eq!((status, &variant["same"]), (200, &json!(beside.is_null())));
             assert_eq!(variant["along"], json!(null), "there is no recording");
         }
         // Made of a text that is no longer there, or of nothing.
         assert_eq!(
-            told(&desk.answer_request("edit", edit(41, "").as_bytes())).0,
+            view_json(&request_handler.answer_request("edit", edit(41, "").as_bytes())).0,
             409
         );
-        assert_eq!(told(&desk.answer_request("edit", b"{}")).0, 400);
-        assert_eq!(told(&desk.answer_request("compile", b"{}")).0, 404);
+        assert_eq!(view_json(&request_handler.answer_request("edit", b"{}")).0, 400);
+        assert_eq!(view_json(&request_handler.answer_request("compile", b"{}")).0, 404);
         assert_eq!(
-            told(&desk.answer_request("open", br#"{ "model": "none.toml" }"#)).0,
+            view_json(&request_handler.answer_request("open", br#"{ "model": "none.toml" }"#)).0,
             422
         );
     }

@@ -6,7 +6,7 @@ use crate::error::Outcome;
 use crate::identify::{self, Identification};
 use crate::identify::{EquationWeights, EstimatorOptions};
 use crate::model::Model;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// A model with its forces along the recordings.
 pub struct ModelVersion {
@@ -100,8 +100,6 @@ impl ModelVersion {
 
     /// Errors of a drive over some recordings, one after the other.
     pub fn errors(&self, runs: &[usize], drive: usize) -> Vec<f64> {
-        runs.iter()
-            .flat_map(|k| self.runs[*k].error(drive))
-            .collect()
+        runs.iter().flat_map(|k| self.runs[*k].error(drive)).collect()
     }
 }

@@ -16,11 +16,7 @@ const MOST: usize = 2000;
 impl EffectSelector<'_> {
     /// Effects that a set with the residual `rest` cannot decide. Only effects with one choice of columns at one place
     /// are considered.
-    pub(crate) fn find_undetermined(
-        &self,
-        picks: &[SelectedEffect],
-        rest: &[Vec<f64>],
-    ) -> Vec<LocatedEffect> {
+    pub(crate) fn find_undetermined(&self, picks: &[SelectedEffect], rest: &[Vec<f64>]) -> Vec<LocatedEffect> {
         // Use every n-th sample if there are many.
         let every = self.pool.all_samples().len().div_ceil(MOST).max(1);
         // Orthonormal basis of the columns of model and set (Gram-Schmidt); dependent columns are skipped.
@@ -50,11 +46,7 @@ impl EffectSelector<'_> {
                 continue;
             }
             let pick = self.select_choice(k, 0);
-            let columns: Vec<DVector<f64>> = pick
-                .columns
-                .iter()
-                .map(|k| self.stacked_column(*k, every))
-                .collect();
+            let columns: Vec<DVector<f64>> = pick.columns.iter().map(|k| self.stacked_column(*k, every)).collect();
             // Share of the effect that the model and the set do not contain.
             let Some(share) = least_share(&basis, &columns) else {
                 continue;
@@ -71,8 +63,7 @@ impl EffectSelector<'_> {
             // Undecidable if the uncertainty of its force exceeds the force of the drives. The weights make both
             // relative to the residual.
             if share > UNDETERMINED_LEAST_SHARE
-                && self.effective_equations(rest, &channels) * share * force
-                    < UNDETERMINED_MOST_VARIANCES
+                && self.effective_equations(rest, &channels) * share * force < UNDETERMINED_MOST_VARIANCES
             {
                 untold.push(candidate.effect.clone());
             }
@@ -123,9 +114,7 @@ fn least_share(basis: &[DVector<f64>], columns: &[DVector<f64>]) -> Option<f64> 
     let largest = svd.singular_values.max();
     // Independent directions of the columns.
     let kept = (0..u.ncols()).filter(|k| svd.singular_values[*k] > 1e-6 * largest);
-    let left: Vec<DVector<f64>> = kept
-        .map(|k| project_out(basis, &u.column(k).into_owned()))
-        .collect();
+    let left: Vec<DVector<f64>> = kept.map(|k| project_out(basis, &u.column(k).into_owned())).collect();
     let left = DMatrix::from_columns(&left);
     let shares = left.singular_values();
     let squares = shares

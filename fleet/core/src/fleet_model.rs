@@ -71,9 +71,7 @@ impl FleetModel {
     pub fn columns(&self) -> Vec<String> {
         let model = self.common.model();
         let time = std::iter::once("t".to_owned());
-        time.chain(model.active_coordinates())
-            .chain(model.drives())
-            .collect()
+        time.chain(model.active_coordinates()).chain(model.drives()).collect()
     }
 
     /// Names of the drives.
@@ -112,11 +110,7 @@ impl FleetModel {
     }
 
     /// The summary of a recording, or a summary that lists it as bad.
-    fn summary_or_bad(
-        &self,
-        name: &str,
-        recording: Result<PreparedRecording, FleetFault>,
-    ) -> FleetSummary {
+    fn summary_or_bad(&self, name: &str, recording: Result<PreparedRecording, FleetFault>) -> FleetSummary {
         recording
             .and_then(|recording| self.sum_recording(name, recording))
             .unwrap_or_else(|fault| FleetSummary {
@@ -129,19 +123,13 @@ impl FleetModel {
     }
 
     /// Checks the sensors of a recording and sums it up.
-    fn sum_recording(
-        &self,
-        name: &str,
-        mut recording: PreparedRecording,
-    ) -> Result<FleetSummary, FleetFault> {
+    fn sum_recording(&self, name: &str, mut recording: PreparedRecording) -> Result<FleetSummary, FleetFault> {
         // Dead sensors are recognised in the raw readings.
         let time = recording.raw_column("t").unwrap_or_default();
         let columns: Vec<(&str, bool, &[f64], f64)> = self
             .still
             .iter()
-            .filter_map(|(of, is_force, usual)| {
-                Some((of.as_str(), *is_force, recording.raw_column(of)?, *usual))
-            })
+            .filter_map(|(of, is_force, usual)| Some((of.as_str(), *is_force, recording.raw_column(of)?, *usual)))
             .collect();
         let sensors = sensors::sensor_faults(name, time, &columns);
         // Size of the recording.
@@ -171,16 +159,13 @@ impl FleetModel {
         // Forces of dead sensors are excluded above; their drives have no residual either.
         let sums = self.common.sums(&recording)?;
         let is_dead = |drive: &String| sensors.iter().any(|one| one.of == *drive);
-        let left = drives
-            .iter()
-            .zip(&sums.residual_ratios)
-            .map(|(drive, left)| {
-                if is_dead(drive) {
-                    0.0
-                } else {
-                    left * left * samples as f64
-                }
-            });
+        let left = drives.iter().zip(&sums.residual_ratios).map(|(drive, left)| {
+            if is_dead(drive) {
+                0.0
+            } else {
+                left * left * samples as f64
+            }
+        });
         // Sums over all rows, from which parameters and changes are computed.
         Ok(FleetSummary {
             mark: self.mark,
@@ -216,9 +201,7 @@ impl FleetModel {
                     first.says
                 ),
             };
-            return Err(FleetFault::new(format!(
-                "this summary has no usable recording: {why}"
-            )));
+            return Err(FleetFault::new(format!("this summary has no usable recording: {why}")));
         };
         Ok(FleetFit {
             parameters: self.common.fit_parameters(base)?,
@@ -244,18 +227,15 @@ impl FleetModel {
     /// A fit as JSON: `parameters` with `name`, `expression`, `value`, `std` (null where not determined) and `unit`.
     pub fn json(&self, fit: &FleetFit) -> Value {
         let parameters = self.parameters();
-        let parameters = parameters
-            .iter()
-            .zip(&fit.parameters)
-            .map(|(info, fitted)| {
-                json!({
-                    "name": info.name,
-                    "expression": info.expression,
-                    "value": fitted.value,
-                    "std": fitted.deviation,
-                    "unit": info.unit,
-                })
-            });
+        let parameters = parameters.iter().zip(&fit.parameters).map(|(info, fitted)| {
+            json!({
+                "name": info.name,
+                "expression": info.expression,
+                "value": fitted.value,
+                "std": fitted.deviation,
+                "unit": info.unit,
+            })
+        });
         json!({
             "parameters": parameters.collect::<Vec<_>>(),
             "left": self.drives().into_iter().zip(fit.residual_shares.iter().map(|x| json!(x))).collect::<serde_json::Map<_, _>>(),
@@ -266,11 +246,7 @@ impl FleetModel {
 }
 
 /// Leaves the forces of dead sensors out of all equations.
-fn exclude_dead_sensors(
-    recording: &mut PreparedRecording,
-    drives: &[String],
-    sensors: &[SensorFault],
-) {
+fn exclude_dead_sensors(recording: &mut PreparedRecording, drives: &[String], sensors: &[SensorFault]) {
     // Drives with a dead force sensor.
     let is_dead: Vec<bool> = (drives.iter())
         .map(|drive| sensors.iter().any(|one| one.is_force && one.of == *drive))
@@ -278,18 +254,13 @@ fn exclude_dead_sensors(
     if !is_dead.contains(&true) {
         return;
     }
-    for stretch in &mut recording.segments {
-        let run = &mut stretch.run;
+    for segment in &mut recording.segments {
+        let run = &mut segment.run;
         // No sample is left out so far.
         if run.left_out.is_empty() {
             run.left_out = vec![vec![false; run.time.len()]; drives.len()];
         }
-        for (out, _) in run
-            .left_out
-            .iter_mut()
-            .zip(&is_dead)
-            .filter(|(_, dead)| **dead)
-        {
+        for (out, _) in run.left_out.iter_mut().zip(&is_dead).filter(|(_, dead)| **dead) {
             out.fill(true);
         }
     }
@@ -298,9 +269,7 @@ fn exclude_dead_sensors(
 /// Sorts columns by time. Rows of equal time keep their order, and are refused later.
 ///
 /// Fails if columns have different lengths.
-fn sort_by_time(
-    mut columns: Vec<(String, Vec<f64>)>,
-) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
+fn sort_by_time(mut columns: Vec<(String, Vec<f64>)>) -> Result<Vec<(String, Vec<f64>)>, FleetFault> {
     let Some((_, time)) = columns.iter().find(|(name, _)| name == "t") else {
         // The reader of recordings reports missing columns, and knows the mapping of the plan for time.
         return Ok(columns);

@@ -22,16 +22,11 @@ impl EffectSelector<'_> {
             let own = others.remove(i);
             self.update_choices(&others);
             // Only kinds with fewer independent columns whose columns lie in the span of the member are simpler.
-            let rank = self.current_choices[own.candidate]
-                .as_ref()
-                .map_or(0, |p| p.rank);
+            let rank = self.current_choices[own.candidate].as_ref().map_or(0, |p| p.rank);
             let beside = self.conditioning_set(&others);
             let nested: Vec<SelectedEffect> = (self.current_choices.iter().flatten())
                 .filter(|one| one.rank < rank)
-                .filter(|one| {
-                    self.candidate(one).searched_constants
-                        <= self.candidate(&own).searched_constants
-                })
+                .filter(|one| self.candidate(one).searched_constants <= self.candidate(&own).searched_constants)
                 .filter(|one| self.is_in_conditional_span(one, &own, &beside))
                 .cloned()
                 .collect();
@@ -43,12 +38,8 @@ impl EffectSelector<'_> {
                 let trial = self.fit_set(set);
                 // The simpler effect must be supported by evidence of its own.
                 if trial.is_possible()
-                    && !self
-                        .evidence(&trial.picks, &picks, &channels)
-                        .is_sufficient()
-                    && self
-                        .evidence(&others, &trial.picks, &channels)
-                        .is_sufficient()
+                    && !self.evidence(&trial.picks, &picks, &channels).is_sufficient()
+                    && self.evidence(&others, &trial.picks, &channels).is_sufficient()
                 {
                     picks = trial.picks;
                     break;
@@ -116,9 +107,7 @@ impl EffectSelector<'_> {
             let is_bent = candidate.searched_constants > 0 && candidate.parameters.len() > 1;
             is_bent && candidate.effect.at == *place
         };
-        let bent: Vec<usize> = (0..rest.len())
-            .filter(|k| is_bent_there(&rest[*k]))
-            .collect();
+        let bent: Vec<usize> = (0..rest.len()).filter(|k| is_bent_there(&rest[*k])).collect();
         let rest = self.refine_members(rest, bent);
         self.refresh_columns(rest)
     }
@@ -147,12 +136,7 @@ impl EffectSelector<'_> {
 
     /// A set with one effect in place of two members with the same span; `None` if there is no such candidate or the
     /// fit is physically impossible.
-    fn merge_identical_pair(
-        &mut self,
-        picks: &[SelectedEffect],
-        i: usize,
-        j: usize,
-    ) -> Option<Vec<SelectedEffect>> {
+    fn merge_identical_pair(&mut self, picks: &[SelectedEffect], i: usize, j: usize) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let others = without_members(picks, &[i, j]);
         // Candidates that have enough columns for both.
@@ -172,12 +156,7 @@ impl EffectSelector<'_> {
 
     /// A set with one effect in place of two members at the same place. The effect contains one of them, or is the same
     /// kind with other constants. It is accepted if it is supported by evidence and the pair is not clearly better.
-    fn merge_similar_pair(
-        &mut self,
-        picks: &[SelectedEffect],
-        i: usize,
-        j: usize,
-    ) -> Option<Vec<SelectedEffect>> {
+    fn merge_similar_pair(&mut self, picks: &[SelectedEffect], i: usize, j: usize) -> Option<Vec<SelectedEffect>> {
         let pair = [picks[i].clone(), picks[j].clone()];
         let [one, two] = pair.each_ref().map(|p| &self.candidate(p).effect);
         // Only effects at the same place are joined here.
@@ -199,8 +178,7 @@ impl EffectSelector<'_> {
         let channels = self.affected_channels(&pair);
         for one in seen.into_iter().flatten() {
             // The candidate is one of the pair with other constants, or contains one of the pair.
-            let is_held =
-                |p: &SelectedEffect| p.candidate == one.candidate || self.is_in_span(p, &one);
+            let is_held = |p: &SelectedEffect| p.candidate == one.candidate || self.is_in_span(p, &one);
             if !pair.iter().any(is_held) {
                 continue;
             }
@@ -214,9 +192,7 @@ impl EffectSelector<'_> {
             if trial.is_possible()
                 && !for_both.is_sufficient()
                 && for_both.bic < EQUALLY_GOOD_DIFFERENCE
-                && self
-                    .evidence(&others, &trial.picks, &channels)
-                    .is_sufficient()
+                && self.evidence(&others, &trial.picks, &channels).is_sufficient()
                 && !self.is_worse(&trial.picks, picks)
             {
                 return Some(trial.picks);
@@ -230,8 +206,7 @@ impl EffectSelector<'_> {
         let candidates = self.problem.candidates.iter().enumerate();
         let may_hold = candidates.filter(|(k, candidate)| {
             // A candidate that contains both needs at least as many parameters.
-            let has_room =
-                candidate.searched_constants == 0 && candidate.parameters.len() >= n_columns(pair);
+            let has_room = candidate.searched_constants == 0 && candidate.parameters.len() >= n_columns(pair);
             // Columns that do not depend on the fit can be tested at once.
             has_room
                 && match &candidate.source {

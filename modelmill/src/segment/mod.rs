@@ -80,9 +80,7 @@ impl RecordingSegment {
                     qd: cut(&run.qd),
                     qdd: cut(&run.qdd),
                     force: run.force.as_deref().map(cut),
-                    left_out: (run.left_out.iter())
-                        .map(|one| one[start..end].to_vec())
-                        .collect(),
+                    left_out: (run.left_out.iter()).map(|one| one[start..end].to_vec()).collect(),
                     lines: run.lines.get(start..end).unwrap_or_default().to_vec(),
                     file: run.file.clone(),
                     missing_force: run.missing_force.clone(),
@@ -91,8 +89,7 @@ impl RecordingSegment {
                     notes: Vec::new(),
                 },
                 variance: self.variance.as_deref().map(cut),
-                weights: (self.weights.as_ref())
-                    .map(|weights| weights[from * drives..to * drives].to_vec()),
+                weights: (self.weights.as_ref()).map(|weights| weights[from * drives..to * drives].to_vec()),
                 load: self.load.as_deref().map(cut),
                 maps_from_degrees: self.maps_from_degrees.clone(),
                 faults: Vec::new(),
@@ -106,11 +103,7 @@ impl RecordingSegment {
         let every = self.decimation();
         self.run.left_out.get(drive).is_some_and(|out| {
             // The filter is taken to reach one decimated step to either side.
-            let to = if every == 1 {
-                kept + 1
-            } else {
-                every * (kept + 1) + 1
-            };
+            let to = if every == 1 { kept + 1 } else { every * (kept + 1) + 1 };
             let around = (every * kept).saturating_sub(every - 1)..to.min(out.len());
             out[around].contains(&true)
         })
@@ -225,8 +218,7 @@ impl RecordingSegment {
             ),
             PoseReason::Undefined => (
                 "a term of the model has no finite value at this state",
-                "check the effects whose expressions contain quotients, roots or exponentials"
-                    .into(),
+                "check the effects whose expressions contain quotients, roots or exponentials".into(),
             ),
             PoseReason::Singular => (
                 "the mechanism is singular at this pose, where forces are not determined",

@@ -36,32 +36,23 @@ impl FileAccessPolicy {
 
     /// A policy that also permits the files named at the start, and the files that the model files on disk include.
     pub(crate) fn for_session(host: &Host, options: &Options) -> Arc<Self> {
-        let fence = Self::for_model_folder(&options.model);
+        let file_access = Self::for_model_folder(&options.model);
         let named = (options.data.iter().chain(&options.check).flatten())
             .chain(host.libraries())
             .chain([&options.model])
             .chain(&options.beside);
-        named.for_each(|path| fence.allow_file(path));
-        for model in [Some(&options.model), options.beside.as_ref()]
-            .into_iter()
-            .flatten()
-        {
+        named.for_each(|path| file_access.allow_file(path));
+        for model in [Some(&options.model), options.beside.as_ref()].into_iter().flatten() {
             match host.load(model) {
-                Ok(loaded) => loaded
-                    .sources
-                    .paths()
-                    .for_each(|path| fence.allow_file(path)),
+                Ok(loaded) => loaded.sources.paths().for_each(|path| file_access.allow_file(path)),
                 // A model with faults may be edited as well, so its files are permitted too.
                 Err(Error::Model(fault)) => {
-                    fault
-                        .sources
-                        .paths()
-                        .for_each(|path| fence.allow_file(path));
+                    fault.sources.paths().for_each(|path| file_access.allow_file(path));
                 }
                 Err(_) => {}
             }
         }
-        fence
+        file_access
     }
 
     /// Permits one file.
@@ -133,11 +124,11 @@ mod tests {
         for name in ["models/arm.toml", "models/base.toml", "secret", "run.csv"] {
             std::fs::write(folder.join(name), name).unwrap();
         }
-        let fence = FileAccessPolicy::for_model_folder(&inside.join("arm.toml"));
-        let read = |name: &str| fence.read(&inside.join(name), 100).is_ok();
+        let file_access = FileAccessPolicy::for_model_folder(&inside.join("arm.toml"));
+        let read = |name: &str| file_access.read(&inside.join(name), 100).is_ok();
         assert!(read("arm.toml") && read("base.toml"));
         assert!(!read("../secret") && !read("../run.csv") && !read("/etc/passwd"));
-        fence.allow_file(&folder.join("run.csv"));
+        file_access.allow_file(&folder.join("run.csv"));
         assert!(read("../run.csv") && !read("../secret"));
         #[cfg(unix)]
         {

@@ -40,7 +40,7 @@ pub(crate) fn path_segments(
     }
     path.push(PathSegment { turns, vector: *at });
     // Zero vectors contribute nothing.
-    path.retain(|stretch| stretch.vector != vector::ZERO);
+    path.retain(|segment| segment.vector != vector::ZERO);
     path
 }
 
@@ -65,9 +65,9 @@ pub(crate) fn fixed_rotations(tree: &KinematicTree, links: &[usize]) -> Option<V
 pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicVector {
     let vectors: Vec<SymbolicVector> = path
         .iter()
-        .map(|stretch| {
-            let mut v = stretch.vector;
-            for turn in stretch.turns.iter().rev() {
+        .map(|segment| {
+            let mut v = segment.vector;
+            for turn in segment.turns.iter().rev() {
                 v = graph.rotate_out(turn, &v);
             }
             v
@@ -77,10 +77,7 @@ pub(crate) fn sum_segments(graph: &mut Graph, path: &[PathSegment]) -> SymbolicV
 }
 
 /// Position of a point in its own frame, as expressions, m.
-pub(crate) fn local_position(
-    graph: &mut Graph,
-    point: &FramePoint,
-) -> Result<SymbolicVector, DeriveError> {
+pub(crate) fn local_position(graph: &mut Graph, point: &FramePoint) -> Result<SymbolicVector, DeriveError> {
     Ok([
         expressions::expression(graph, &point.at[0])?,
         expressions::expression(graph, &point.at[1])?,
@@ -111,20 +108,14 @@ pub(crate) struct PointPairPath<'a> {
 
 impl PointPairPath<'_> {
     /// The vector from the second point to the first as segments, in the common frame rotated by `start`.
-    pub(crate) fn segments(
-        &self,
-        graph: &mut Graph,
-        tree: &KinematicTree,
-        start: &[AxisRotation],
-    ) -> Vec<PathSegment> {
+    pub(crate) fn segments(&self, graph: &mut Graph, tree: &KinematicTree, start: &[AxisRotation]) -> Vec<PathSegment> {
         // Both paths start in the common frame.
-        let [first, second] =
-            [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
+        let [first, second] = [0, 1].map(|i| path_segments(tree, self.paths[i], start, &self.at[i]));
         let mut path = first;
         // The second path is subtracted.
-        for mut stretch in second {
-            stretch.vector = stretch.vector.map(|x| graph.neg(x));
-            path.push(stretch);
+        for mut segment in second {
+            segment.vector = segment.vector.map(|x| graph.neg(x));
+            path.push(segment);
         }
         path
     }
@@ -152,15 +143,10 @@ pub(crate) fn distance_squared(
     points: [usize; 2],
 ) -> Result<ExprId, DeriveError> {
     let points = points.map(|i| &mechanism.points[i]);
-    let at = [
-        local_position(graph, points[0])?,
-        local_position(graph, points[1])?,
-    ];
+    let at = [local_position(graph, points[0])?, local_position(graph, points[1])?];
     // The part of the tree that both points share has no effect on the distance.
     let paths = points.map(|p| tree.path_to(tree.link_of(p.frame)));
-    let common = (paths[0].iter().zip(&paths[1]))
-        .take_while(|(x, y)| x == y)
-        .count();
+    let common = (paths[0].iter().zip(&paths[1])).take_while(|(x, y)| x == y).count();
     let between = PointPairPath {
         paths: [&paths[0][common..], &paths[1][common..]],
         at,

@@ -11,11 +11,7 @@ use serde_json::{Value, json};
 use crate::options::WorkbenchCommands;
 
 /// View of a derivation: warnings and notes if the text is valid, else its faults with their lines.
-pub(crate) fn derivation_view(
-    found: &Result<Model, Error>,
-    path: &str,
-    spelling: &dyn RemedySpelling,
-) -> Value {
+pub(crate) fn derivation_view(found: &Result<Model, Error>, path: &str, spelling: &dyn RemedySpelling) -> Value {
     match found {
         Ok(model) => json!({
             "valid": true,
@@ -33,11 +29,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
     let base: Vec<Value> = (model.base.iter().enumerate())
         .map(|(k, base)| {
             // Base parameters of two models correspond if their expressions are equal.
-            let same = |one: &&Model| {
-                one.base
-                    .iter()
-                    .position(|b| b.expression == base.expression)
-            };
+            let same = |one: &&Model| one.base.iter().position(|b| b.expression == base.expression);
             let before = saved.and_then(|saved| Some((saved, same(&saved)?)));
             let was = before.and_then(|(saved, i)| value(saved, i));
             let now = value(model, k);
@@ -60,12 +52,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
         .collect();
     // Base parameters of the saved model that the edited one does not have.
     let gone: Vec<&str> = (saved.iter().flat_map(|saved| &saved.base))
-        .filter(|old| {
-            model
-                .base
-                .iter()
-                .all(|new| new.expression != old.expression)
-        })
+        .filter(|old| model.base.iter().all(|new| new.expression != old.expression))
         .map(|old| old.expression.as_str())
         .collect();
     let summary = ModelCheck {
@@ -95,10 +82,7 @@ pub(crate) fn errors(
     recordings: &[Vec<PreparedRecording>; 2],
     spelling: &dyn RemedySpelling,
 ) -> Value {
-    let remarks = recordings
-        .iter()
-        .flatten()
-        .flat_map(PreparedRecording::notes);
+    let remarks = recordings.iter().flatten().flat_map(PreparedRecording::notes);
     let mut notes: Vec<&RecordingNote> = Vec::new();
     for note in remarks.chain(&found.notes) {
         if !notes.contains(&note) {
@@ -117,24 +101,24 @@ pub(crate) fn errors(
 /// effects that can be added.
 pub(crate) fn findings(findings: &DiagnosisFindings, commands: &dyn WorkbenchCommands) -> Value {
     let model = &findings.before.model;
-    let mut told = findings.json(commands);
-    told["says"] = json!(words::verdict(
+    let mut view_json = findings.json(commands);
+    view_json["says"] = json!(words::verdict(
         &findings.diagnosis,
         findings.channels(),
         findings.validation
     ));
-    told["ladder"] = json!(report::ladder(findings));
-    told["judged"] = json!(findings.validation.phrase());
-    told["entries"] = findings
+    view_json["ladder"] = json!(report::ladder(findings));
+    view_json["judged"] = json!(findings.validation.phrase());
+    view_json["entries"] = findings
         .entries_to_add()
         .iter()
         .map(|entry| {
-            let mut told = edit::effect_json(entry);
-            told["command"] = json!(commands.spell_effect(model, entry));
-            told
+            let mut view_json = edit::effect_json(entry);
+            view_json["command"] = json!(commands.spell_effect(model, entry));
+            view_json
         })
         .collect();
-    told
+    view_json
 }
 
 /// Data for completions in the editor: the schema of model files, and the known kinds of effects.

@@ -20,22 +20,12 @@ pub fn recorded_variances(
     run: &PreparedRun,
     drives: &[String],
 ) -> Outcome<Option<Vec<Vec<f64>>>> {
-    if drives.is_empty()
-        || !drives
-            .iter()
-            .all(|drive| recording.has_column(&column(drive)))
-    {
+    if drives.is_empty() || !drives.iter().all(|drive| recording.has_column(&column(drive))) {
         return Ok(None);
     }
     // A run may have lost samples at its ends and at gaps; the lines of the file identify those that remain.
-    let lines: Vec<u64> = (0..recording.samples())
-        .filter_map(|i| recording.line(i))
-        .collect();
-    let places: Option<Vec<usize>> = run
-        .lines
-        .iter()
-        .map(|line| lines.binary_search(line).ok())
-        .collect();
+    let lines: Vec<u64> = (0..recording.samples()).filter_map(|i| recording.line(i)).collect();
+    let places: Option<Vec<usize>> = run.lines.iter().map(|line| lines.binary_search(line).ok()).collect();
     let Some(places) = places else {
         return Err(Error::input(message!(
             "{}: the variances cannot be matched with the samples that remain after preparation; omit \
@@ -48,22 +38,13 @@ pub fn recorded_variances(
         let values = recording.column(&column(drive))?;
         Ok(places.iter().map(|at| values[*at]).collect())
     };
-    drives
-        .iter()
-        .map(column_of)
-        .collect::<Outcome<Vec<_>>>()
-        .map(Some)
+    drives.iter().map(column_of).collect::<Outcome<Vec<_>>>().map(Some)
 }
 
 /// Weights of the rows: the inverse standard deviation, interleaved per sample; every `every`-th sample.
 ///
 /// Fails at a variance that is not positive.
-pub fn factors(
-    variance: &[Vec<f64>],
-    run: &PreparedRun,
-    drives: &[String],
-    every: usize,
-) -> Outcome<Vec<f64>> {
+pub fn factors(variance: &[Vec<f64>], run: &PreparedRun, drives: &[String], every: usize) -> Outcome<Vec<f64>> {
     let samples = variance.first().map_or(0, Vec::len);
     let mut factors = Vec::with_capacity(samples.div_ceil(every) * drives.len());
     // Decimation keeps every n-th sample; its variance stands for the row.

@@ -13,7 +13,7 @@ use modelmill_identify::{DECIMATION_PASSBAND, LowPass, RecordingNote, decimate_t
 use crate::error::{Error, Outcome};
 use crate::model::Model;
 use crate::recording::PreparedRecording;
-use crate::stretch::RecordingSegment;
+use crate::segment::RecordingSegment;
 
 /// Segments with fewer samples are not decimated here. By judgement.
 const LONG: usize = 150_000;
@@ -50,9 +50,8 @@ pub(crate) fn thin_out(model: &Model, stretch: &RecordingSegment) -> Outcome<Rec
     };
     let kept = samples.div_ceil(every);
     // With more decimation the parallel filter would remove too much of the band in which effects differ.
-    let most = (stretch.run.prepared.band_hz).map_or(every as f64, |band| {
-        DECIMATION_PASSBAND / (PART_OF_BAND * band * step)
-    });
+    let most =
+        (stretch.run.prepared.band_hz).map_or(every as f64, |band| DECIMATION_PASSBAND / (PART_OF_BAND * band * step));
     // The largest decimation that keeps the band, down to `KEPT` samples.
     let wanted = (every + 1..=every * kept.div_ceil(KEPT))
         .rev()
@@ -150,10 +149,7 @@ mod tests {
 
     #[test]
     fn as_few_samples_are_kept_as_the_band_allows() {
-        let path = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../model-spec/models/emps.toml"
-        );
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../model-spec/models/emps.toml");
         let model = Host::default().model(path);
         let model = model.unwrap_or_else(|error| panic!("{error}"));
         for (samples, band, kept) in [
@@ -165,11 +161,7 @@ mod tests {
         ] {
             let whole = long(samples, band);
             let fewer = thin_out(&model, &whole).unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!(
-                fewer.samples().div_ceil(fewer.decimation()),
-                kept,
-                "{band} Hz"
-            );
+            assert_eq!(fewer.samples().div_ceil(fewer.decimation()), kept, "{band} Hz");
             let again = thin_out(&model, &fewer).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(again.samples(), fewer.samples());
             assert_eq!(again.decimation(), fewer.decimation());

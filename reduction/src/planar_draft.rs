@@ -43,14 +43,7 @@ pub(crate) struct DraftSymbols(pub(crate) Vec<DraftSymbol>);
 
 impl DraftSymbols {
     /// Adds a value to the symbol `name`, which is created at its first value. `what` names the quantity.
-    pub(crate) fn add_value(
-        &mut self,
-        name: &str,
-        unit: &'static str,
-        note: &str,
-        what: &str,
-        value: f64,
-    ) {
+    pub(crate) fn add_value(&mut self, name: &str, unit: &'static str, note: &str, what: &str, value: f64) {
         // Parts that share a symbol add their values to it.
         let known = self.0.iter().position(|symbol| symbol.name == name);
         let at = known.unwrap_or_else(|| {
@@ -76,11 +69,7 @@ impl DraftSymbols {
     /// Step 3: reports each shared symbol with the largest difference of its values.
     pub(crate) fn report_ties(&self, report: &mut ReductionReport) {
         for symbol in self.0.iter().filter(|symbol| symbol.stands_for.len() > 1) {
-            let who: Vec<&str> = symbol
-                .stands_for
-                .iter()
-                .map(|(what, _)| what.as_str())
-                .collect();
+            let who: Vec<&str> = symbol.stands_for.iter().map(|(what, _)| what.as_str()).collect();
             report.add(
                 3,
                 &symbol.name,

@@ -4,9 +4,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::features::{
-    FactorCatalog, LawFactor, LawProduct, LawSite, factors_with_other, own_factors, range,
-};
+use super::features::{FactorCatalog, LawFactor, LawProduct, LawSite, factors_with_other, own_factors, range};
 use super::shapes::LawVariable;
 use crate::diagnose::bench::{EffectSelector, SelectedEffect};
 use crate::diagnose::thresholds::LAW_INDEPENDENCE_TOLERANCE;
@@ -67,9 +65,9 @@ impl<'a> LawSamples<'a> {
         });
         let mut start = 0;
         // First sample of each segment, counted over all segments.
-        let starts = layout.segments.iter().map(|stretch| {
+        let starts = layout.segments.iter().map(|segment| {
             let this = start;
-            start += stretch.samples;
+            start += segment.samples;
             this
         });
         Self {
@@ -94,12 +92,7 @@ impl<'a> LawSamples<'a> {
     }
 
     /// Columns of a factor at the selected samples: one, or two for sine and cosine.
-    fn factor_columns(
-        &self,
-        site: usize,
-        other: Option<usize>,
-        factor: &LawFactor,
-    ) -> Vec<Vec<f64>> {
+    fn factor_columns(&self, site: usize, other: Option<usize>, factor: &LawFactor) -> Vec<Vec<f64>> {
         if !factor.shape.has_memory() {
             let track = self.track(site, other, factor.variable);
             return factor.shape.values(track, &[0]);
@@ -120,10 +113,7 @@ impl<'a> LawSamples<'a> {
             let shapes = self.factor_columns(site, product.other, factor);
             columns = pairwise_products(&columns, &shapes);
         }
-        columns
-            .iter()
-            .map(|one| self.drive_forces(site, one))
-            .collect()
+        columns.iter().map(|one| self.drive_forces(site, one)).collect()
     }
 
     /// Forces of the drives for a force at a place, one channel after the other, relative to the noise.
@@ -138,16 +128,11 @@ impl<'a> LawSamples<'a> {
     /// Indices of the channels on which a force at a place has an effect.
     pub(crate) fn channels(&self, site: usize) -> Vec<usize> {
         let of = self.forces[site].iter().enumerate();
-        of.filter_map(|(d, force)| force.as_ref().map(|_| d))
-            .collect()
+        of.filter_map(|(d, force)| force.as_ref().map(|_| d)).collect()
     }
 
     /// Factors that are tried at a place, alone and with each other place for which `wanted` is true.
-    fn factor_catalogs(
-        &self,
-        site: usize,
-        wanted: &dyn Fn(usize) -> bool,
-    ) -> Vec<(Option<usize>, FactorCatalog)> {
+    fn factor_catalogs(&self, site: usize, wanted: &dyn Fn(usize) -> bool) -> Vec<(Option<usize>, FactorCatalog)> {
         // The motion at the place itself comes first.
         let [position, rate, _, _] = &self.tracks[site];
         let load = self.loads[site].as_ref().map(|_| &self.tracks[site][3][..]);
@@ -155,10 +140,7 @@ impl<'a> LawSamples<'a> {
         for (other, [position, other_rate, _, _]) in self.tracks.iter().enumerate() {
             if other != site && wanted(other) {
                 let is_angle = self.sites[other].is_angle;
-                menus.push((
-                    Some(other),
-                    factors_with_other(rate, position, other_rate, is_angle),
-                ));
+                menus.push((Some(other), factors_with_other(rate, position, other_rate, is_angle)));
             }
         }
         menus
@@ -242,11 +224,7 @@ impl LawProjection {
 
     /// Projects out further columns (Gram-Schmidt, each column twice against rounding).
     fn project_out(&mut self, columns: impl Iterator<Item = DVector<f64>>) {
-        let mut basis: Vec<DVector<f64>> = self
-            .basis
-            .column_iter()
-            .map(nalgebra::Matrix::into_owned)
-            .collect();
+        let mut basis: Vec<DVector<f64>> = self.basis.column_iter().map(nalgebra::Matrix::into_owned).collect();
         for column in columns {
             let mut left = column.clone();
             // Twice, since the first pass has rounding errors.
@@ -273,12 +251,7 @@ impl LawProjection {
     }
 
     /// A copy with a product at a place projected out as well.
-    pub(crate) fn conditional_on_product(
-        &self,
-        samples: &LawSamples<'_>,
-        site: usize,
-        product: &LawProduct,
-    ) -> Self {
+    pub(crate) fn conditional_on_product(&self, samples: &LawSamples<'_>, site: usize, product: &LawProduct) -> Self {
         // The residual is projected again together with the basis.
         let mut more = self.clone();
         let n = self.samples;
@@ -383,9 +356,8 @@ impl SiteProjection {
         // Products of all columns with the basis and with the residual, in two matrix products.
         let taken = &self.basis * &matrix;
         let with_rest = matrix.tr_mul(&self.residual);
-        let product = |i: usize, j: usize| {
-            matrix.column(i).dot(&matrix.column(j)) - taken.column(i).dot(&taken.column(j))
-        };
+        let product =
+            |i: usize, j: usize| matrix.column(i).dot(&matrix.column(j)) - taken.column(i).dot(&taken.column(j));
         let mut at = 0;
         let of_group = |count: &usize| {
             // Indices of the one or two columns of the group.
@@ -394,8 +366,7 @@ impl SiteProjection {
             let own = product(i, i);
             // Whether a column depends on what is projected out.
             let is_said = |own: f64, k: usize| {
-                !own.is_finite()
-                    || own <= LAW_INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
+                !own.is_finite() || own <= LAW_INDEPENDENCE_TOLERANCE * matrix.column(k).norm_squared()
             };
             if is_said(own, i) {
                 return 0.0;
@@ -438,12 +409,7 @@ impl ProductBatch {
     }
 
     /// Scores the collected products and empties the batch, if it has at least `least` columns.
-    fn score_batch(
-        &mut self,
-        part: &SiteProjection,
-        least: usize,
-        scored: &mut Vec<ScoredProduct>,
-    ) {
+    fn score_batch(&mut self, part: &SiteProjection, least: usize, scored: &mut Vec<ScoredProduct>) {
         if self.columns.len() < least {
             return;
         }

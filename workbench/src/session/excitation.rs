@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::{WorkbenchSession, thin_out};
 use crate::options::ExcitationSettings;
-use crate::told;
+use crate::view;
 use crate::watch::JobWatch;
 
 /// Largest number of harmonics; more is a typing error.
@@ -85,9 +85,7 @@ impl ExcitationSettings {
                 "rate: expected 1 to 100000 samples per second, and at most {MOST_SAMPLES} samples in a period"
             ));
         }
-        let limit = |text: &String| {
-            TrajectoryLimit::parse(text).map_err(|says| format!("`{text}`: {says}"))
-        };
+        let limit = |text: &String| TrajectoryLimit::parse(text).map_err(|says| format!("`{text}`: {says}"));
         Ok(ExcitationRequest {
             options: Options {
                 harmonics: self.harmonics,
@@ -116,7 +114,7 @@ impl WorkbenchSession {
             Ok(model) => model.loaded.kinds.clone(),
             Err(_) => self.host.kinds().map_err(|error| self.error_text(&error))?,
         };
-        Ok(told::completion_data(&kinds))
+        Ok(view::completion_data(&kinds))
     }
 
     /// Limits of the active coordinates in the text, as JSON; `null` where there is none.
@@ -148,7 +146,7 @@ impl WorkbenchSession {
         let watch = Arc::new(JobWatch::new(Arc::clone(&self.surroundings)));
         let (text, revision) = {
             let state = self.state();
-            (state.draft.text().to_owned(), state.draft.revision())
+            (state.document.text().to_owned(), state.document.revision())
         };
         let number = {
             let mut planning = self.planning();
@@ -164,17 +162,17 @@ impl WorkbenchSession {
             };
             planning.number
         };
-        let sitting = Arc::clone(self);
+        let session = Arc::clone(self);
         let host = self.host.clone().with_progress(watch as _);
         let work = move || {
             // After a panic the page would wait forever; it gets an error instead.
-            let asked = std::panic::AssertUnwindSafe(|| sitting.plan(&host, &text, &request));
+            let asked = std::panic::AssertUnwindSafe(|| session.plan(&host, &text, &request));
             let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
                 Err(Error::input(
                     "the search ended with an internal error of the program, not of your input",
                 ))
             });
-            sitting.finish_excitation(number, found);
+            session.finish_excitation(number, found);
         };
         if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
             self.planning().running = None;
@@ -184,31 +182,26 @@ impl WorkbenchSession {
     }
 
     /// Derives the text and searches for the trajectory, on the thread of the job.
-    fn plan(
-        &self,
-        host: &modelmill::Host,
-        text: &str,
-        request: &ExcitationRequest,
-    ) -> Outcome<PlannedTrajectory> {
+    fn plan(&self, host: &modelmill::Host, text: &str, request: &ExcitationRequest) -> Outcome<PlannedTrajectory> {
         let path = &self.options.model;
         let model = host.derive(&self.name(), host.load_text(path, text)?)?;
         let found = model.excite(request, &[])?;
-        let mut told = found.json();
-        told["picture"] = json!(found.picture);
-        told["names"] = json!(found.coordinates);
-        told["time"] = json!(thin_out(&found.time));
-        told["q"] = found.motion.q.iter().map(|q| json!(thin_out(q))).collect();
-        told["samples"] = json!(found.time.len());
-        told["says"] = json!(format!(
+        let mut view_json = found.json();
+        view_json["picture"] = json!(found.picture);
+        view_json["names"] = json!(found.coordinates);
+        view_json["time"] = json!(thin_out(&found.time));
+        view_json["q"] = found.motion.q.iter().map(|q| json!(thin_out(q))).collect();
+        view_json["samples"] = json!(found.time.len());
+        view_json["says"] = json!(format!(
             "The condition number is {}. It was {} for the best of {} random trajectories within the limits.",
             significant(found.found.condition_number, 4),
             significant(found.found.start_condition_number, 4),
             found.found.feasible_starts
         ));
         let notes = found.notes.iter();
-        told["notes"] = notes.map(|note| note.json(&*self.commands)).collect();
+        view_json["notes"] = notes.map(|note| note.json(&*self.commands)).collect();
         Ok(PlannedTrajectory {
-            view: told,
+            view: view_json,
             csv: found.csv(),
         })
     }
@@ -239,12 +232,12 @@ impl WorkbenchSession {
 
     /// View of the search: its progress, or its result.
     pub(crate) fn excitation(&self) -> Value {
-        let revision = self.state().draft.revision();
+        let revision = self.state().document.revision();
         let planning = self.planning();
         let going = planning.running.as_ref().map(|(watch, since)| {
-            let mut told = watch.progress_view();
-            told["seconds"] = json!(self.surroundings.seconds() - since);
-            told
+            let mut view_json = watch.progress_view();
+            view_json["seconds"] = json!(self.surroundings.seconds() - since);
+            view_json
         });
         let answer = planning.answer.as_ref();
         json!({
@@ -283,10 +276,7 @@ impl WorkbenchSession {
         let folder = self.options.model.parent().unwrap_or(Path::new(""));
         let path = folder.join(name);
         if self.surroundings.files().kind(&path) != PathKind::Missing {
-            return Err(format!(
-                "{} is there already; give another name",
-                path.display()
-            ));
+            return Err(format!("{} is there already; give another name", path.display()));
         }
         let csv = match &self.planning().answer {
             Some(Ok(planned)) => planned.csv.clone(),

@@ -40,10 +40,7 @@ impl RecordingFiles {
     }
 
     /// Makes a recording of columns in memory; `name` is its name in messages. Fails when columns differ in length.
-    pub fn from_table(
-        name: &str,
-        columns: Vec<(String, Vec<f64>)>,
-    ) -> Result<Self, RecordingError> {
+    pub fn from_table(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, RecordingError> {
         let file = RecordingFile::from_table(name, columns)?;
         Ok(Self {
             name: file.name().to_owned(),
@@ -61,12 +58,7 @@ impl RecordingFiles {
         let mut all = Vec::new();
         for file in &self.files {
             let names = file.names()?;
-            all.extend(
-                names
-                    .into_iter()
-                    .filter(|name| !all.contains(name))
-                    .collect::<Vec<_>>(),
-            );
+            all.extend(names.into_iter().filter(|name| !all.contains(name)).collect::<Vec<_>>());
         }
         Ok(all)
     }
@@ -138,20 +130,14 @@ impl RecordingFiles {
         Ok(SignalRecording {
             file: self.name.clone(),
             others: others.collect(),
-            columns: std::iter::once(("t".to_owned(), time))
-                .chain(columns)
-                .collect(),
+            columns: std::iter::once(("t".to_owned(), time)).chain(columns).collect(),
             lines,
             notes,
         })
     }
 
     /// Fails when a needed column or a computed column has no unique file.
-    fn check_unique_sources(
-        &self,
-        names: &[Vec<String>],
-        options: &ReadOptions,
-    ) -> Result<(), RecordingError> {
+    fn check_unique_sources(&self, names: &[Vec<String>], options: &ReadOptions) -> Result<(), RecordingError> {
         // The time may be in every file, because it joins them.
         let time: Vec<&str> = time_names(options);
         for (k, of_file) in names.iter().enumerate() {

@@ -12,7 +12,7 @@ use modelmill::identify::EstimatorOptions;
 use modelmill::model::PageFormat;
 use modelmill::picture::{DrawingStyle, DriveArrow, PictureOptions};
 use modelmill::recording::PreparedRecording;
-use modelmill::stretch::RecordingSegment;
+use modelmill::segment::RecordingSegment;
 use modelmill::{Error, Host, Model, Outcome, report};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -24,12 +24,12 @@ use excitation::ExcitationJob;
 pub(crate) use excitation::KeepTrajectoryRequest;
 use ladder::ErrorLadder;
 
-use crate::draft::EditedDocument;
+use crate::document::EditedDocument;
 use crate::options::{ExcitationSettings, Options, WorkbenchCommands, WorkbenchStep};
 use crate::readings::{RecordingCache, SessionRecordings};
-use crate::surroundings::SessionEnvironment;
-use crate::told;
+use crate::surrounding_files::SessionEnvironment;
 use crate::variant::{self, VariantCache};
+use crate::view;
 use crate::watch::JobWatch;
 
 /// Longest model file that is edited, bytes.
@@ -62,7 +62,7 @@ pub(crate) struct WorkbenchSession {
 /// The part of a session that the lock protects.
 struct SessionState {
     /// The edited text and the text on disk.
-    draft: EditedDocument,
+    document: EditedDocument,
     /// The last derivation; its revision may be older than the text.
     derived: DerivedRevision,
     /// The model of the text as it was last read or saved; `None` if that text has faults.
@@ -140,20 +140,20 @@ impl WorkbenchSession {
             .at_values(host.is_at_values())
             .with_files(surroundings.files());
         let text = read_model_text(&host, &options.model).map_err(Error::input)?;
-        let draft = EditedDocument::new(text, options.first + 1);
+        let document = EditedDocument::new(text, options.first + 1);
         let version = AtomicU64::new(options.first + 1);
         surroundings.notify_change(options.first + 1);
         let now = derive_revision(
             &host,
             &*surroundings,
             &options.model,
-            draft.text(),
-            draft.revision(),
+            document.text(),
+            document.revision(),
         );
         let saved = now.found.as_ref().as_ref().ok().cloned();
         let state = SessionState {
             other_files: other_file_contents(&host, saved.as_ref()),
-            draft,
+            document,
             derived: now,
             saved,
             unreadable: None,
@@ -198,21 +198,21 @@ impl WorkbenchSession {
         let name = self.name();
         let now = &state.derived;
         let (model, saved) = (now.found.as_ref().as_ref().ok(), state.saved.as_ref());
-        let mut told = told::derivation_view(&now.found, &name, &*self.commands);
-        told["model"] = model.map_or(Value::Null, |model| told::equations(model, saved));
-        told["version"] = json!(self.version.load(Ordering::Relaxed));
-        told["revision"] = json!(state.draft.revision());
-        told["derived"] = json!(now.revision);
-        told["seconds"] = json!(now.seconds);
-        told["file"] = json!(name);
-        told["text"] = json!(state.draft.text());
-        told["changed"] = json!(state.draft.is_changed());
-        told["conflict"] = json!(state.draft.is_in_conflict());
-        told["unreadable"] = json!(state.unreadable);
-        told["data"] = json!(!self.options.data.is_empty());
-        told["opened"] = json!(self.options.first);
-        told["ladder"] = state.ladder.view();
-        told["commands"] = json!({
+        let mut view_json = view::derivation_view(&now.found, &name, &*self.commands);
+        view_json["model"] = model.map_or(Value::Null, |model| view::equations(model, saved));
+        view_json["version"] = json!(self.version.load(Ordering::Relaxed));
+        view_json["revision"] = json!(state.document.revision());
+        view_json["derived"] = json!(now.revision);
+        view_json["seconds"] = json!(now.seconds);
+        view_json["file"] = json!(name);
+        view_json["text"] = json!(state.document.text());
+        view_json["changed"] = json!(state.document.is_changed());
+        view_json["conflict"] = json!(state.document.is_in_conflict());
+        view_json["unreadable"] = json!(state.unreadable);
+        view_json["data"] = json!(!self.options.data.is_empty());
+        view_json["opened"] = json!(self.options.first);
+        view_json["ladder"] = state.ladder.view();
+        view_json["commands"] = json!({
             "picture": self.commands.step_command(WorkbenchStep::Picture),
             "equations": self.commands.step_command(WorkbenchStep::Equations),
             "compare": self.commands.step_command(WorkbenchStep::Compare),
@@ -220,7 +220,7 @@ impl WorkbenchSession {
             "diagnose": self.commands.step_command(WorkbenchStep::Diagnose),
             "excite": self.commands.excite_command(&ExcitationSettings::default()),
         });
-        told
+        view_json
     }
 
     /// Accepts an edit of revision `base` and derives the new text; `None` if the text has changed since. With `did`,
@@ -228,14 +228,14 @@ impl WorkbenchSession {
     pub(crate) fn edit(&self, base: u64, text: &str, did: Option<&str>) -> Option<Value> {
         {
             let mut state = self.state();
-            let before = state.draft.revision();
+            let before = state.document.revision();
             if did.is_some() {
                 state.ladder.end_typing(before);
             }
-            if !state.draft.edit(base, text) {
+            if !state.document.edit(base, text) {
                 return None;
             }
-            if state.draft.revision() == before {
+            if state.document.revision() == before {
                 drop(state);
                 return Some(self.view());
             }
@@ -251,18 +251,12 @@ impl WorkbenchSession {
     fn derive(&self) {
         let (text, revision) = {
             let state = self.state();
-            (state.draft.text().to_owned(), state.draft.revision())
+            (state.document.text().to_owned(), state.document.revision())
         };
-        let now = derive_revision(
-            &self.host,
-            &*self.surroundings,
-            &self.options.model,
-            &text,
-            revision,
-        );
+        let now = derive_revision(&self.host, &*self.surroundings, &self.options.model, &text, revision);
         let mut state = self.state();
-        if state.draft.revision() == revision {
-            if !state.draft.is_changed() {
+        if state.document.revision() == revision {
+            if !state.document.is_changed() {
                 state.saved = now.found.as_ref().as_ref().ok().cloned();
                 state.other_files = other_file_contents(&self.host, state.saved.as_ref());
             }
@@ -279,9 +273,9 @@ impl WorkbenchSession {
         let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
         if let Ok(disk) = disk {
-            state.draft.update_from_disk(&disk);
+            state.document.update_from_disk(&disk);
         }
-        if state.draft.is_in_conflict() {
+        if state.document.is_in_conflict() {
             drop(state);
             self.notify_pages();
             return Err(format!(
@@ -289,12 +283,12 @@ impl WorkbenchSession {
                 self.name()
             ));
         }
-        if state.draft.is_changed() {
-            let bytes = state.draft.text().as_bytes();
+        if state.document.is_changed() {
+            let bytes = state.document.text().as_bytes();
             (self.surroundings.write(&self.options.model, bytes))
                 .map_err(|error| format!("nothing is saved: {error}"))?;
-            state.draft.mark_saved();
-            if state.derived.revision == state.draft.revision() {
+            state.document.mark_saved();
+            if state.derived.revision == state.document.revision() {
                 state.saved = state.derived.found.as_ref().as_ref().ok().cloned();
                 state.other_files = other_file_contents(&self.host, state.saved.as_ref());
             }
@@ -312,10 +306,10 @@ impl WorkbenchSession {
         {
             let mut state = self.state();
             if take_theirs {
-                state.draft.accept_outside_text();
+                state.document.accept_outside_text();
                 state.record_step("changed outside");
             } else {
-                state.draft.keep_own_text();
+                state.document.keep_own_text();
             }
         }
         self.derive();
@@ -325,16 +319,14 @@ impl WorkbenchSession {
     /// Checks whether another program changed the model file or one that it uses; derives again if so.
     #[cfg(not(target_family = "wasm"))]
     pub(crate) fn check_disk(&self) {
-        use crate::draft::DiskChange;
+        use crate::document::DiskChange;
 
         let disk = read_model_text(&self.host, &self.options.model);
         let mut state = self.state();
         let unreadable = disk.as_ref().err().map(ToString::to_string);
         let is_news = state.unreadable != unreadable;
         state.unreadable = unreadable;
-        let seen = disk.map_or(DiskChange::Unchanged, |disk| {
-            state.draft.update_from_disk(&disk)
-        });
+        let seen = disk.map_or(DiskChange::Unchanged, |disk| state.document.update_from_disk(&disk));
         if seen == DiskChange::Reloaded {
             state.record_step("changed outside");
         }
@@ -386,20 +378,18 @@ impl WorkbenchSession {
                 saved.filter(|saved| seeing.shadow && saved.text() != model.text())
             }
         };
-        let told = |error| self.error_text(&error);
+        let view_json = |error| self.error_text(&error);
         match model.picture(&drawing, shadow.as_ref()) {
             // The other mechanism may have other coordinates, or may not reach this pose; then it is left out.
-            Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(told),
-            drawn => drawn.map_err(told),
+            Err(_) if shadow.is_some() => model.picture(&drawing, None).map_err(view_json),
+            drawn => drawn.map_err(view_json),
         }
     }
 
     /// The page of equations as HTML.
     pub(crate) fn equations(&self) -> Result<String, String> {
         let (model, _) = self.model()?;
-        let written = model
-            .equations(PageFormat::Html)
-            .map_err(|e| self.error_text(&e))?;
+        let written = model.equations(PageFormat::Html).map_err(|e| self.error_text(&e))?;
         Ok(written.text)
     }
 
@@ -419,31 +409,29 @@ impl WorkbenchSession {
     /// regions with the largest error, `is_afresh` reads the recordings again.
     pub(crate) fn compare(&self, with_places: bool, is_afresh: bool) -> Result<Value, String> {
         let (model, revision) = self.model()?;
-        let mut told = (|| {
+        let mut view_json = (|| {
             let read = || self.recordings(&model);
             let (read, is_read) = self.readings.recordings_for(&model, is_afresh, read)?;
             let [fit, check] = read.each_ref().map(|all| all.iter().collect::<Vec<_>>());
             let identified = model.identify(&fit, &check, &EstimatorOptions::default())?;
-            let mut told = told::errors(&identified, &read, &*self.commands);
-            told["afresh"] = json!(is_read);
+            let mut view_json = view::errors(&identified, &read, &*self.commands);
+            view_json["afresh"] = json!(is_read);
             if with_places {
-                told["compared"] = model
-                    .compare(&fit, &model.nominal)?
-                    .json("nominal", &*self.commands)?;
+                view_json["compared"] = model.compare(&fit, &model.nominal)?.json("nominal", &*self.commands)?;
             }
-            Ok(told)
+            Ok(view_json)
         })()
         .map_err(|error| self.error_text(&error))?;
-        told["revision"] = json!(revision);
+        view_json["revision"] = json!(revision);
         let mut state = self.state();
-        if state.draft.revision() == revision {
-            let errors = json!({ "nominal": relative_errors(&told["nominal"]), "identified": relative_errors(&told["identified"]) });
+        if state.document.revision() == revision {
+            let errors = json!({ "nominal": relative_errors(&view_json["nominal"]), "identified": relative_errors(&view_json["identified"]) });
             if state.ladder.add_errors(revision, errors) {
                 drop(state);
                 self.notify_pages();
             }
         }
-        Ok(told)
+        Ok(view_json)
     }
 
     /// Curves of forces and errors along the recordings, as HTML: of the text, and of the saved model if it differs.
@@ -452,40 +440,27 @@ impl WorkbenchSession {
         let saved = self.state().saved.clone();
         let version = |model: Model| -> Outcome<ModelVersion> {
             let [fit, check] = self.recordings(&model)?;
-            let stretches =
-                |all: Vec<PreparedRecording>| all.into_iter().flat_map(|one| one.segments);
+            let stretches = |all: Vec<PreparedRecording>| all.into_iter().flat_map(|one| one.segments);
             let held = if is_identified {
                 FixedParameters::Known
             } else {
                 FixedParameters::All
             };
-            ModelVersion::new(
-                model,
-                stretches(fit).collect(),
-                stretches(check).collect(),
-                held,
-            )
+            ModelVersion::new(model, stretches(fit).collect(), stretches(check).collect(), held)
         };
-        let told = |error| self.error_text(&error);
+        let view_json = |error| self.error_text(&error);
         // Curves of models with different drives cannot be compared.
-        let other =
-            saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
-        let edited = version(model).map_err(told)?;
+        let other = saved.filter(|saved| saved.text() != model.text() && saved.drives() == model.drives());
+        let edited = version(model).map_err(view_json)?;
         Ok(match other.map(version) {
-            Some(Ok(saved)) => {
-                report::curves(&saved, Some(&edited), ["model as saved", "as edited"])
-            }
+            Some(Ok(saved)) => report::curves(&saved, Some(&edited), ["model as saved", "as edited"]),
             _ => report::curves(&edited, None, ["model", ""]),
         })
     }
 
     /// Models that the text can be compared with: those of the model's folder, and the one named at the start.
     pub(crate) fn models(&self) -> Value {
-        let named = self
-            .options
-            .beside
-            .as_ref()
-            .map(|path| path.display().to_string());
+        let named = self.options.beside.as_ref().map(|path| path.display().to_string());
         let mut models = variant::models_in_folder(&self.host, &self.options.model);
         models.retain(|name| {
             let near = self.options.model.with_file_name(name);
@@ -499,9 +474,7 @@ impl WorkbenchSession {
     fn comparison_model(&self, name: Option<&str>) -> Result<Model, String> {
         let Some(name) = name else {
             let saved = self.state().saved.clone();
-            return saved.ok_or_else(|| {
-                "the saved file has faults, so there is nothing to compare with".to_owned()
-            });
+            return saved.ok_or_else(|| "the saved file has faults, so there is nothing to compare with".to_owned());
         };
         let path = self.path_of(name);
         let found = self.variant.model(&self.host, &path);
@@ -520,7 +493,7 @@ impl WorkbenchSession {
     pub(crate) fn variant(&self, beside: Option<&str>) -> Result<Value, String> {
         let (model, revision) = self.model()?;
         let other = self.comparison_model(beside)?;
-        let told = self.variant.comparison_view(
+        let view_json = self.variant.comparison_view(
             &other,
             &model,
             &*self.commands,
@@ -530,12 +503,11 @@ impl WorkbenchSession {
                 Ok(self.readings.recordings_for(&model, false, read)?.0)
             },
         );
-        let mut told = told.map_err(|error| self.error_text(&error))?;
-        told["revision"] = json!(revision);
-        told["same"] = json!(other.text() == model.text());
-        told["command"] =
-            json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
-        Ok(told)
+        let mut view_json = view_json.map_err(|error| self.error_text(&error))?;
+        view_json["revision"] = json!(revision);
+        view_json["same"] = json!(other.text() == model.text());
+        view_json["command"] = json!(beside.and_then(|name| self.commands.variant_command(&self.path_of(name))));
+        Ok(view_json)
     }
 
     /// Poses along the recordings over time, with measured forces and the errors of the model if these can be computed.
@@ -557,9 +529,9 @@ impl WorkbenchSession {
             .collect();
         // Without forces the picture still moves, but has no arrows.
         if let Ok(version) = ModelVersion::new(model, fit, check, FixedParameters::All) {
-            for (told, run) in runs.iter_mut().zip(&version.runs) {
+            for (view_json, run) in runs.iter_mut().zip(&version.runs) {
                 let all = 0..drives.len();
-                told["forces"] = json!({
+                view_json["forces"] = json!({
                     "time": thin_out(&run.time),
                     "measured": run.measured.iter().map(|f| thin_out(f)).collect::<Vec<_>>(),
                     "error": all.map(|d| thin_out(&run.error(d))).collect::<Vec<_>>(),
@@ -585,23 +557,23 @@ impl WorkbenchSession {
             }
             state.diagnosis = DiagnosisJob {
                 number: state.diagnosis.number + 1,
-                revision: state.draft.revision(),
+                revision: state.document.revision(),
                 running: Some((Arc::clone(&watch), self.surroundings.seconds())),
                 ..DiagnosisJob::default()
             };
-            (state.draft.text().to_owned(), state.diagnosis.number)
+            (state.document.text().to_owned(), state.diagnosis.number)
         };
-        let sitting = Arc::clone(self);
+        let session = Arc::clone(self);
         let host = self.host.clone().with_progress(Arc::clone(&watch) as _);
         let work = move || {
             // After a panic the page would wait forever; it gets an error instead.
-            let asked = std::panic::AssertUnwindSafe(|| sitting.run_diagnosis(&host, &text));
+            let asked = std::panic::AssertUnwindSafe(|| session.run_diagnosis(&host, &text));
             let found = std::panic::catch_unwind(asked).unwrap_or_else(|_| {
                 Err(Error::input(
                     "the diagnosis ended with an internal error of the program, not of your input",
                 ))
             });
-            sitting.finish_diagnosis(number, found);
+            session.finish_diagnosis(number, found);
         };
         if let Err(error) = self.surroundings.spawn_work(Box::new(work)) {
             self.state().diagnosis.running = None;
@@ -618,7 +590,7 @@ impl WorkbenchSession {
         let [fit, check] = [&fit, &check].map(|all| all.iter().collect::<Vec<_>>());
         let findings = model.diagnose(&fit, &check, &DiagnosisOptions::default())?;
         Ok((
-            told::findings(&findings, &*self.commands),
+            view::findings(&findings, &*self.commands),
             findings.entries_to_add().to_vec(),
         ))
     }
@@ -632,8 +604,8 @@ impl WorkbenchSession {
         }
         diagnosis.running = None;
         match found {
-            Ok((told, entries)) => {
-                diagnosis.answer = Some(Ok(told));
+            Ok((view_json, entries)) => {
+                diagnosis.answer = Some(Ok(view_json));
                 diagnosis.entries = entries;
             }
             Err(Error::Cancelled) => diagnosis.was_cancelled = true,
@@ -656,9 +628,9 @@ impl WorkbenchSession {
         let state = self.state();
         let diagnosis = &state.diagnosis;
         let going = diagnosis.running.as_ref().map(|(watch, since)| {
-            let mut told = watch.progress_view();
-            told["seconds"] = json!(self.surroundings.seconds() - since);
-            told
+            let mut view_json = watch.progress_view();
+            view_json["seconds"] = json!(self.surroundings.seconds() - since);
+            view_json
         });
         json!({
             "number": diagnosis.number,
@@ -666,7 +638,7 @@ impl WorkbenchSession {
             "cancelled": diagnosis.was_cancelled,
             "found": diagnosis.answer.as_ref().and_then(|answer| answer.as_ref().ok()),
             "failed": diagnosis.answer.as_ref().and_then(|answer| answer.as_ref().err()),
-            "of_this_text": diagnosis.revision == state.draft.revision(),
+            "of_this_text": diagnosis.revision == state.document.revision(),
         })
     }
 
@@ -678,26 +650,18 @@ impl WorkbenchSession {
             let state = self.state();
             let effect = state.diagnosis.entries.get(entry).cloned();
             let effect = effect.ok_or("there is no such finding; run the diagnosis again")?;
-            (
-                state.draft.text().to_owned(),
-                state.draft.revision(),
-                effect,
-            )
+            (state.document.text().to_owned(), state.document.revision(), effect)
         };
         let edited = self.host.edit(&self.name(), &text, &effect);
         let edited = edited.map_err(|error| self.error_text(&error))?;
         {
             let mut state = self.state();
-            let now = state.draft.revision();
+            let now = state.document.revision();
             state.ladder.end_typing(now);
-            if !state.draft.edit(revision, &edited.text) {
+            if !state.document.edit(revision, &edited.text) {
                 return Err("the text was changed meanwhile; add the effect again".to_owned());
             }
-            let what = format!(
-                "+ {} ({})",
-                effect.kind.replace('_', " "),
-                effect.at.join(", ")
-            );
+            let what = format!("+ {} ({})", effect.kind.replace('_', " "), effect.at.join(", "));
             state.record_step(&what);
         }
         self.derive();
@@ -713,7 +677,7 @@ impl WorkbenchSession {
 impl SessionState {
     /// Records a step that led to the current text.
     fn record_step(&mut self, what: &str) {
-        self.ladder.record_step(self.draft.revision(), what);
+        self.ladder.record_step(self.document.revision(), what);
     }
 }
 
@@ -750,9 +714,7 @@ fn derive_revision(
 /// Contents of the other files that a model uses; `None` for a file that cannot be read.
 fn other_file_contents(host: &Host, model: Option<&Model>) -> Vec<Option<Vec<u8>>> {
     let paths = model.into_iter().flat_map(|model| model.files().skip(1));
-    paths
-        .map(|path| host.files().read(path, LONGEST).ok())
-        .collect()
+    paths.map(|path| host.files().read(path, LONGEST).ok()).collect()
 }
 
 /// The relative errors (nrms) of fit and validation.

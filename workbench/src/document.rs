@@ -150,56 +150,53 @@ mod tests {
 
     #[test]
     fn what_others_write_is_followed_where_nothing_is_lost() {
-        let mut draft = EditedDocument::new("a".to_owned(), 1);
-        assert_eq!(draft.update_from_disk("a"), DiskChange::Unchanged);
-        assert_eq!(draft.update_from_disk("b"), DiskChange::Reloaded);
-        assert_eq!(
-            (draft.text(), draft.saved(), draft.revision()),
-            ("b", "b", 2)
-        );
-        assert!(!draft.is_changed());
+        let mut document = EditedDocument::new("a".to_owned(), 1);
+        assert_eq!(document.update_from_disk("a"), DiskChange::Unchanged);
+        assert_eq!(document.update_from_disk("b"), DiskChange::Reloaded);
+        assert_eq!((document.text(), document.saved(), document.revision()), ("b", "b", 2));
+        assert!(!document.is_changed());
         // An edit made of the text before is too late.
-        assert!(!draft.edit(1, "late"));
-        assert_eq!(draft.text(), "b");
-        assert!(draft.edit(2, "mine"));
-        assert_eq!(draft.update_from_disk("mine"), DiskChange::Unchanged);
-        assert!(!draft.is_changed());
+        assert!(!document.edit(1, "late"));
+        assert_eq!(document.text(), "b");
+        assert!(document.edit(2, "mine"));
+        assert_eq!(document.update_from_disk("mine"), DiskChange::Unchanged);
+        assert!(!document.is_changed());
     }
 
     #[test]
     fn lines_end_as_they_did() {
-        let mut draft = EditedDocument::new("a\r\nb\r\n".to_owned(), 1);
-        assert!(draft.edit(1, "a\nb\n"));
-        assert!(!draft.is_changed());
-        assert!(draft.edit(1, "a\nc\nb\n"));
-        assert_eq!(draft.text(), "a\r\nc\r\nb\r\n");
-        let mut draft = EditedDocument::new("a\nb\n".to_owned(), 1);
-        assert!(draft.edit(1, "a\nc\n"));
-        assert_eq!(draft.text(), "a\nc\n");
+        let mut document = EditedDocument::new("a\r\nb\r\n".to_owned(), 1);
+        assert!(document.edit(1, "a\nb\n"));
+        assert!(!document.is_changed());
+        assert!(document.edit(1, "a\nc\nb\n"));
+        assert_eq!(document.text(), "a\r\nc\r\nb\r\n");
+        let mut document = EditedDocument::new("a\nb\n".to_owned(), 1);
+        assert!(document.edit(1, "a\nc\n"));
+        assert_eq!(document.text(), "a\nc\n");
     }
 
     #[test]
     fn both_texts_stay_until_somebody_chooses() {
         let conflict = || {
-            let mut draft = EditedDocument::new("a".to_owned(), 1);
-            assert!(draft.edit(1, "mine"));
-            assert_eq!(draft.update_from_disk("theirs"), DiskChange::Conflict);
-            assert_eq!(draft.update_from_disk("theirs"), DiskChange::Unchanged);
-            assert!(draft.is_in_conflict() && draft.text() == "mine");
-            draft
+            let mut document = EditedDocument::new("a".to_owned(), 1);
+            assert!(document.edit(1, "mine"));
+            assert_eq!(document.update_from_disk("theirs"), DiskChange::Conflict);
+            assert_eq!(document.update_from_disk("theirs"), DiskChange::Unchanged);
+            assert!(document.is_in_conflict() && document.text() == "mine");
+            document
         };
-        let mut draft = conflict();
-        draft.keep_own_text();
-        assert!(draft.is_changed() && !draft.is_in_conflict());
+        let mut document = conflict();
+        document.keep_own_text();
+        assert!(document.is_changed() && !document.is_in_conflict());
         // A further change by others is a further conflict.
-        assert_eq!(draft.update_from_disk("theirs"), DiskChange::Unchanged);
-        assert_eq!(draft.update_from_disk("theirs again"), DiskChange::Conflict);
-        let mut draft = conflict();
-        draft.accept_outside_text();
-        assert_eq!((draft.text(), draft.saved()), ("theirs", "theirs"));
+        assert_eq!(document.update_from_disk("theirs"), DiskChange::Unchanged);
+        assert_eq!(document.update_from_disk("theirs again"), DiskChange::Conflict);
+        let mut document = conflict();
+        document.accept_outside_text();
+        assert_eq!((document.text(), document.saved()), ("theirs", "theirs"));
         // What goes back to what it was is no conflict any more.
-        let mut draft = conflict();
-        assert_eq!(draft.update_from_disk("a"), DiskChange::Unchanged);
-        assert!(!draft.is_in_conflict() && draft.text() == "mine");
+        let mut document = conflict();
+        assert_eq!(document.update_from_disk("a"), DiskChange::Unchanged);
+        assert!(!document.is_in_conflict() && document.text() == "mine");
     }
 }

@@ -4,8 +4,8 @@ use super::bench::{EffectSelector, ScoredEffectSet, SelectedEffect};
 use super::column::ForceColumn;
 use super::pool::FitScope;
 use super::problem::{
-    CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, EffectParameter,
-    ForceReadingFault, LocatedEffect, ReadingFaultKind, SignConstraint,
+    CandidateEffect, CandidateNature, ColumnSource, DiagnosisProblem, EffectParameter, ForceReadingFault,
+    LocatedEffect, ReadingFaultKind, SignConstraint,
 };
 use super::thresholds::MIN_DISTINCTION;
 
@@ -31,9 +31,7 @@ impl ReadingFaultKind {
 pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffect> {
     let layout = &problem.layout;
     // Only channels with a force signal can have a faulty one.
-    let read: Vec<usize> = (0..layout.channels.len())
-        .filter(|d| !problem.is_idle(*d))
-        .collect();
+    let read: Vec<usize> = (0..layout.channels.len()).filter(|d| !problem.is_idle(*d)).collect();
     // With one channel, its fault is that of all channels.
     let has_others = read.len() > 1;
     // With several channels, each may have its own delay and low-pass; each may have its own scale in any case.
@@ -65,10 +63,7 @@ pub fn reading_fault_candidates(problem: &DiagnosisProblem) -> Vec<CandidateEffe
                 refines: None,
                 nature: CandidateNature::Effect,
                 is_per_run: false,
-                source: ColumnSource::ReadingFault(ForceReadingFault {
-                    kind: fault,
-                    channel,
-                }),
+                source: ColumnSource::ReadingFault(ForceReadingFault { kind: fault, channel }),
             }
         })
         .collect()
@@ -98,29 +93,28 @@ impl EffectSelector<'_> {
             // Segment by segment, since neither a delay nor a low-pass crosses a gap.
             let mut changes = Vec::with_capacity(values.len());
             let mut start = 0;
-            for stretch in &self.problem.layout.segments {
-                let part = &values[start..start + stretch.samples];
+            for segment in &self.problem.layout.segments {
+                let part = &values[start..start + segment.samples];
                 // Delay or time constant in samples.
-                let samples = value / stretch.step;
+                let samples = value / segment.step;
                 // For a small delay or time constant T both faults change the force by -T df/dt.
                 if samples.abs() < SLIGHT {
-                    changes.extend(central_differences(part).map(|slope| -slope / stretch.step));
+                    changes.extend(central_differences(part).map(|slope| -slope / segment.step));
                 } else if reading.kind == ReadingFaultKind::Delayed {
                     // Decimation with its filter smooths the jumps of dry friction, so that they need no special
                     // treatment.
-                    let has_jumps = stretch.step < ROUNDS_OFF * stretch.recorded_step;
+                    let has_jumps = segment.step < ROUNDS_OFF * segment.recorded_step;
                     let rates = has_jumps.then(|| self.problem.friction.get(3 * d));
                     let rates = rates.flatten().and_then(|column| column.0[d].as_deref());
-                    let rates = rates.map(|rates| &rates[start..start + stretch.samples]);
-                    let late =
-                        (0..part.len()).map(|i| interpolate_force(part, rates, i as f64 - samples));
+                    let rates = rates.map(|rates| &rates[start..start + segment.samples]);
+                    let late = (0..part.len()).map(|i| interpolate_force(part, rates, i as f64 - samples));
                     changes.extend(late.zip(part).map(|(then, now)| (then - now) / value));
                 } else {
                     // Difference of the filtered force and the force, per unit of the time constant.
                     let filtered = low_pass(part, samples.abs()).into_iter().zip(part);
                     changes.extend(filtered.map(|(late, now)| (late - now) / value.abs()));
                 }
-                start += stretch.samples;
+                start += segment.samples;
             }
             Some(changes)
         };
@@ -132,17 +126,13 @@ impl EffectSelector<'_> {
     pub(crate) fn refit_dependent_columns(&mut self, trial: &ScoredEffectSet) -> ScoredEffectSet {
         // Delays and low-passes change their columns with their value; a wrong scale does not.
         let curved = |bench: &Self, pick: &SelectedEffect| match bench.candidate(pick).source {
-            ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => {
-                Some(reading)
-            }
+            ColumnSource::ReadingFault(reading) if reading.kind != ReadingFaultKind::Scaled => Some(reading),
             _ => None,
         };
         let is_curved = |(i, pick): (usize, &SelectedEffect)| Some((i, curved(self, pick)?));
         // Without a delay or low-pass only bodies need columns at their estimated values.
         let Some((at, reading)) = trial.picks.iter().enumerate().find_map(is_curved) else {
-            let is_body = |pick: &SelectedEffect| {
-                matches!(self.candidate(pick).source, ColumnSource::Body(_))
-            };
+            let is_body = |pick: &SelectedEffect| matches!(self.candidate(pick).source, ColumnSource::Body(_));
             if trial.picks.iter().any(is_body) {
                 let refreshed = self.refresh_columns(trial.picks.clone());
                 return ScoredEffectSet {
@@ -182,8 +172,7 @@ impl EffectSelector<'_> {
             let rest = self.residual(&other.picks, &factors);
             let channels: Vec<usize> = (0..rest.len()).collect();
             // Difference of the criterion: both sets have the same number of estimated values.
-            let better =
-                self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
+            let better = self.effective_equations(&rest, &channels) * (best.squares / other.squares).ln();
             let has_signs = other.is_possible();
             // A negative delay is impossible, so the low-pass is taken without a test then.
             if !best.is_possible() || has_signs && better > MIN_DISTINCTION {
@@ -305,11 +294,7 @@ mod tests {
         let changes = changes.0[0].as_ref().unwrap();
         for (i, t) in times.iter().enumerate().skip(2).take(times.len() - 4) {
             let expected = (force(t - delay) - force(*t)) / delay;
-            assert!(
-                (changes[i] - expected).abs() < 5.0,
-                "{t}: {} {expected}",
-                changes[i]
-            );
+            assert!((changes[i] - expected).abs() < 5.0, "{t}: {} {expected}", changes[i]);
         }
     }
 
@@ -318,8 +303,8 @@ mod tests {
     fn a_late_force_jumps_where_the_drive_turns_round() {
         let rate = |t: f64| t - 20.3;
         let force = |t: f64| 3.0 * t + 50.0 * rate(t).signum();
-        let [rates, values]: [Vec<f64>; 2] = [&rate as &dyn Fn(f64) -> f64, &force]
-            .map(|of| (0..40).map(|i| of(f64::from(i))).collect());
+        let [rates, values]: [Vec<f64>; 2] =
+            [&rate as &dyn Fn(f64) -> f64, &force].map(|of| (0..40).map(|i| of(f64::from(i))).collect());
         for i in 1..390 {
             let t = 0.1 * f64::from(i) + 0.05;
             let said = interpolate_force(&values, Some(&rates), t);
