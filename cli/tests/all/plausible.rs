@@ -225,7 +225,7 @@ fn stretches_between_gaps_are_prepared_each_on_its_own() {
         let (t, x) = if t < 6.0 { (t, x) } else { (t + 2.0, x + 3.0) };
         vec![t, x, 3.0 * a + 4.0 * v]
     });
-    remarked(&["compare", &model, "--data", &data], &["1 gap in time", "2 stretches"]);
+    remarked(&["compare", &model, "--data", &data], &["1 gap in time", "the 2 segments are filtered and differentiated separately"]);
     let compared = json(&["compare", &model, "--data", &data, "--json"]);
     assert!(number(&compared, "/nrms") < 5e-3, "{compared:#}");
     let forces = printed(&["evaluate", &model, "--data", &data]);
@@ -490,7 +490,7 @@ fn a_numeric_rank_survives_states_that_have_no_answer() {
     let checked = ran(&["check", &file]);
     // All that there is to say is how the base was found.
     assert!(
-        checked.status == 0 && checked.err.lines().count() == 1 && checked.err.contains("were found numerically"),
+        checked.status == 0 && checked.err.lines().count() == 1 && checked.err.contains("were computed numerically"),
         "{}",
         checked.err
     );

@@ -32,7 +32,7 @@ fn names_of_files_stay_as_they_are() {
     assert_eq!(told["model"], "verb `add`");
     assert_eq!(told["title"], "option `columns` = `q=x` option `data`");
     let text = printed(&["check", &path]);
-    assert!(text.starts_with("verb `add`: sound"), "{text}");
+    assert!(text.starts_with("verb `add`: valid"), "{text}");
     assert!(text.contains("option `columns` = `q=x` option `data`"), "{text}");
     let missing = path.replace("add", "` `--map");
     let says = refused(1, &["check", &missing]);

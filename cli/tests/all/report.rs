@@ -71,8 +71,8 @@ fn the_page_holds_what_diagnose_says_and_needs_nothing_else() {
     }
     for part in [
         "Error maps",
-        "At which frequencies",
-        "What was done to the recordings",
+        "Spectrum of the error",
+        "Recordings and their preparation",
         "p_min",
     ] {
         assert!(page.contains(part), "{part}");
