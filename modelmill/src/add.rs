@@ -31,7 +31,7 @@ impl Model {
     ///
     /// Fails when the edited file is invalid: an unknown kind or place, a missing value, or an effect given twice.
     pub fn with_added_effects(&self, effects: &[NewEffect]) -> Outcome<Model> {
-        let added = added::add_entries(self, effects)?;
+        let added = added_effects::add_entries(self, effects)?;
         Ok(self.host().derive(&self.path, added.loaded)?.with_values_of(self))
     }
 }

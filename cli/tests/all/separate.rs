@@ -345,7 +345,7 @@ fn what_is_misspelt_is_said() {
         ),
         (
             vec!["--separate", LEFT, "--from", "time_delay@force"],
-            "moves all forces in time",
+            "only delays all forces",
         ),
         (
             vec!["--separate", "force_ripple@spindle_left", "--from", LEFT],

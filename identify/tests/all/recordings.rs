@@ -174,7 +174,7 @@ fn samples_left_out_are_counted() {
     assert_eq!(recording.line(1), Some(4));
     assert_eq!(
         recording.notes()[0].says.in_library_words(),
-        "2 of 5 samples of run.csv hold NaN, infinite or empty fields and are left out, the first in line 3."
+        "2 of 5 samples of run.csv contain NaN, infinite or empty fields and are left out, the first in line 3."
     );
 }
 

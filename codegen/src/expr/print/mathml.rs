@@ -28,7 +28,7 @@ impl PrintedFormula {
         write(&mut out, self, false);
         out.end_segment();
         let segments = out.done.into_iter();
-        segments.map(|segment| format!("<mrow>{stretch}</mrow>")).collect()
+        segments.map(|segment| format!("<mrow>{segment}</mrow>")).collect()
     }
 }
 

@@ -202,8 +202,8 @@ fn long_formulas_can_be_parted_within_parentheses_fractions_and_roots() {
     let segments = all.mathml_segments();
     assert!(segments.len() >= 4 * 7, "{}", segments.len());
     for segment in &segments {
-        assert!(markup_is_balanced(segment), "{stretch}");
-        assert!(words(segment).chars().count() < 40, "{stretch}");
+        assert!(markup_is_balanced(segment), "{segment}");
+        assert!(words(segment).chars().count() < 40, "{segment}");
     }
 }
 

@@ -25,7 +25,7 @@ fn the_printed_count_equals_a_recount_of_the_emitted_source() {
             ("forces", &derivation.programs.inverse_dynamics),
         ] {
             // What closes loops stands once, in a function of its own, for all programs.
-            let [own, pose] = [&format!("{method}_program"), "at"].map(|m| recount(&file, m));
+            let [own, pose] = [&format!("{method}_program"), "evaluate_at"].map(|m| recount(&file, m));
             let recount = (own.0 + pose.0, own.1 + pose.1, own.2 + pose.2);
             let count = program.count_operations(ProgramStage::State);
             assert_eq!(recount, (count.add, count.mul, count.div), "{method} of {model}");
