@@ -270,7 +270,7 @@ fn faulty_effects_are_named() {
     assert!(says("viscous_friction", &["motor"], &[("Fv", 1.0), ("fv", 1.0)]).contains("no value `fv`"));
     assert!(says("coupled_drive", &["motor"], &[]).contains("two drives"));
     assert!(says("rod_inertia", &["motor"], &[("m", 1.0), ("c", 0.1), ("I", 0.1)]).contains("linear drive"));
-    assert!(says("load_friction", &["hinge"], &[("mu", 0.1)]).contains("whose load is known"));
+    assert!(says("load_friction", &["hinge"], &[("mu", 0.1)]).contains("its load is known"));
     assert!(says("point_mass", &[], &[("m", 0.1)]).contains("a point of a body"));
     let two = says("force_ripple", &["nowhere"], &[("pitch", -1.0)]);
     assert_eq!(two.lines().count(), 2, "{two}");
