@@ -225,7 +225,13 @@ fn stretches_between_gaps_are_prepared_each_on_its_own() {
         let (t, x) = if t < 6.0 { (t, x) } else { (t + 2.0, x + 3.0) };
         vec![t, x, 3.0 * a + 4.0 * v]
     });
-    remarked(&["compare", &model, "--data", &data], &["1 gap in time", "the 2 segments are filtered and differentiated separately"]);
+    remarked(
+        &["compare", &model, "--data", &data],
+        &[
+            "1 gap in time",
+            "the 2 segments are filtered and differentiated separately",
+        ],
+    );
     let compared = json(&["compare", &model, "--data", &data, "--json"]);
     assert!(number(&compared, "/nrms") < 5e-3, "{compared:#}");
     let forces = printed(&["evaluate", &model, "--data", &data]);

@@ -43,17 +43,20 @@ fn definitions(text: &str, file: &str) -> [Vec<Definition>; 2] {
         if line.starts_with("//") {
             continue;
         }
-        let words: Vec<&str> = line
-            .split(|c: char| !c.is_alphanumeric() && c != '_')
-            .filter(|word| !word.is_empty())
-            .collect();
+        let words: Vec<&str> = line.split_whitespace().collect();
         for pair in words.windows(2) {
             let kind = match pair[0] {
                 "struct" | "enum" | "trait" | "union" => 0,
                 "fn" => 1,
                 _ => continue,
             };
-            found[kind].push((pair[1].to_string(), format!("{file}:{}", number + 1)));
+            let is_part = |c: char| c.is_alphanumeric() || c == '_';
+            let name: String = pair[1].chars().take_while(|c| is_part(*c)).collect();
+            // Templates of emitted code have their names elsewhere.
+            if name.is_empty() {
+                continue;
+            }
+            found[kind].push((name, format!("{file}:{}", number + 1)));
         }
     }
     found
