@@ -14,7 +14,7 @@ const BITS: u64 = 448;
 /// Additional bits for intermediate results of functions.
 const GUARD_BITS: u64 = 64;
 
-/// `mantissa * 2^exponent`, with at most [`BITS`] bits in the mantissa; zero has the exponent zero.
+/// `mantissa * 2^exponent`, with at most `BITS` bits in the mantissa; zero has the exponent zero.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BigFloat {
     /// Signed mantissa.
@@ -40,7 +40,7 @@ impl BigFloat {
         Self::new(BigInt::from(value), 0)
     }
 
-    /// Rounded to [`BITS`] bits, towards zero.
+    /// Rounded to `BITS` bits, towards zero.
     fn new(mantissa: BigInt, exponent: i64) -> Self {
         Self::round_to_bits(mantissa, exponent, BITS)
     }

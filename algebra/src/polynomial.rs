@@ -70,10 +70,10 @@ impl Ord for TermExponents {
 /// A polynomial in `n` unknowns with exact coefficients, none of them zero: a sum of terms in their order.
 ///
 /// ```
-/// use modelmill_algebra::polynomial::{Polynomial, exact};
+/// use modelmill_algebra::polynomial::{Polynomial, exact_decimal};
 /// let mut p = Polynomial::new(2);
-/// p.add_term(&[(0, 1), (1, 2)], &exact(0.5));
-/// p.add_term(&[], &exact(3.0));
+/// p.add_term(&[(0, 1), (1, 2)], &exact_decimal(0.5));
+/// p.add_term(&[], &exact_decimal(3.0));
 /// assert_eq!(p.value(&[4.0, 3.0]), 21.0);
 /// ```
 #[derive(Clone, Debug, PartialEq)]

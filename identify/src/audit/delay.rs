@@ -1,8 +1,8 @@
 //! Delays of forces relative to the motion. Input: a regressor along a recording, its derivative with respect to time,
 //! and the measured forces. Output: one delay for all channels and one for each, with 99 % intervals.
 //!
-//! A force that is recorded at `t` acted at `t - d`: `y(t + d) = W(t) p`. Around a shift `s` by full steps this is `y(t
-//! + s) = W p - (d - s) W' p`, which is linear in `p` and `d` (Gauss-Newton). So measured forces are never
+//! A force that is recorded at `t` acted at `t - d`: `y(t + d) = W(t) p`. Around a shift `s` by full steps this is
+//! `y(t + s) = W p - (d - s) W' p`, which is linear in `p` and `d` (Gauss-Newton). So measured forces are never
 //! differentiated or interpolated, which would bias the result by noise, and the parameters fit the delayed forces.
 //! Fits are robust. Intervals come from fits that leave out one block of time each, since residuals are correlated in
 //! time and differ between blocks.

@@ -189,10 +189,10 @@ impl ModelSummary {
         // A reduction for one geometry only is stated, since its base is not general.
         match reduction.method {
             ReductionMethod::Numeric { .. } => {
-                line("reduced", "numerically, for the values of this file only".to_owned())
+                line("reduced", "numerically, for the values of this file only".to_owned());
             }
             ReductionMethod::Exact { at_values: true, .. } => {
-                line("reduced", "exactly, for the values of this file only".to_owned())
+                line("reduced", "exactly, for the values of this file only".to_owned());
             }
             ReductionMethod::Exact { .. } | ReductionMethod::Unreduced => {}
         }
