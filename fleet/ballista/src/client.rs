@@ -21,7 +21,7 @@ use datafusion::execution::context::SessionContext;
 use datafusion::physical_plan::collect;
 use datafusion::prelude::SessionConfig;
 use datafusion_proto::protobuf::LogicalPlanNode;
-use modelmill_fleet::Ground;
+use modelmill_fleet::FleetModel;
 use modelmill_fleet_datafusion::register;
 
 use crate::stores;
@@ -44,7 +44,7 @@ pub(crate) struct QueryRequest<'a> {
 /// Runs a query and writes the result to standard output.
 ///
 /// Fails if the query is invalid, or the scheduler does not answer.
-pub(crate) async fn run_query(ground: &Arc<Ground>, asked: &QueryRequest<'_>) -> Result<()> {
+pub(crate) async fn run_query(ground: &Arc<FleetModel>, asked: &QueryRequest<'_>) -> Result<()> {
     // A session with the functions of the fleet and the tables.
     let session = open_session(asked).await?;
     register(&session, ground);

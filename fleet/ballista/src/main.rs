@@ -21,7 +21,7 @@ use ballista_core::registry::BallistaFunctionRegistry;
 use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_process};
 use clap::{Parser, Subcommand};
 use datafusion::prelude::SessionConfig;
-use modelmill_fleet::{Fault, Ground, Plan};
+use modelmill_fleet::{FleetFault, FleetModel, FleetPlan};
 use modelmill_fleet_datafusion::aggregates;
 
 /// Compute aggregates of a fleet on several computers.
@@ -106,7 +106,7 @@ fn main() -> ExitCode {
         .thread_stack_size(16 << 20)
         .build();
     let done = runtime
-        .map_err(Fault::new)
+        .map_err(FleetFault::new)
         .and_then(|runtime| runtime.block_on(run(cli)));
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -118,21 +118,23 @@ fn main() -> ExitCode {
 }
 
 /// Reads a plan and derives its model.
-fn load_fleet_model(path: &Path) -> Result<Arc<Ground>, Fault> {
+fn load_fleet_model(path: &Path) -> Result<Arc<FleetModel>, FleetFault> {
     let text = std::fs::read_to_string(path).map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "{} cannot be read: {error}; make a plan with `modelmill-fleet plan`",
             path.display()
         ))
     })?;
-    Ok(Arc::new(Plan::parse(&path.display().to_string(), &text)?.ground()?))
+    Ok(Arc::new(
+        FleetPlan::parse(&path.display().to_string(), &text)?.derive_model()?,
+    ))
 }
 
 /// Largest message between processes, bytes; it must have room for the samples of a recording.
 pub(crate) const LONGEST_MESSAGE: u32 = 256 << 20;
 
 /// Runs a command.
-async fn run(cli: BallistaCli) -> Result<(), Fault> {
+async fn run(cli: BallistaCli) -> Result<(), FleetFault> {
     let ground = load_fleet_model(&cli.plan)?;
     match cli.command {
         BallistaCommand::Scheduler { host, port, timeout } => scheduler::serve(&ground, &host, port, timeout).await,
@@ -156,7 +158,7 @@ async fn run(cli: BallistaCli) -> Result<(), Fault> {
             let work = work.map(|path| path.join(&usual.executor_id));
             if let Some(work) = &work {
                 std::fs::create_dir_all(work).map_err(|error| {
-                    Fault::new(format!(
+                    FleetFault::new(format!(
                         "{} cannot be created: {error}; choose another folder with `--work`",
                         work.display()
                     ))
@@ -180,7 +182,7 @@ async fn run(cli: BallistaCli) -> Result<(), Fault> {
                 override_runtime_producer: Some(Arc::new(runtime)),
                 ..usual
             };
-            start_executor_process(Arc::new(config)).await.map_err(Fault::new)
+            start_executor_process(Arc::new(config)).await.map_err(FleetFault::new)
         }
         BallistaCommand::Query {
             sql,
@@ -194,7 +196,7 @@ async fn run(cli: BallistaCli) -> Result<(), Fault> {
                 scheduler: scheduler.as_deref(),
                 partitions,
             };
-            client::run_query(&ground, &asked).await.map_err(Fault::new)
+            client::run_query(&ground, &asked).await.map_err(FleetFault::new)
         }
     }
 }

@@ -28,7 +28,7 @@ use ballista_scheduler::scheduler_process::start_server;
 use ballista_scheduler::state::task_manager::JobInfoCache;
 use datafusion::execution::SessionStateBuilder;
 use datafusion::prelude::SessionConfig;
-use modelmill_fleet::{Fault, Ground};
+use modelmill_fleet::{FleetFault, FleetModel};
 use modelmill_fleet_datafusion::aggregates;
 
 use crate::{LONGEST_MESSAGE, stores};
@@ -36,7 +36,12 @@ use crate::{LONGEST_MESSAGE, stores};
 /// Serves until the process ends. Executors without a message for `timeout` seconds count as lost.
 ///
 /// Fails if it cannot listen on the address.
-pub(crate) async fn serve(ground: &Arc<Ground>, host: &str, port: u16, timeout: u64) -> std::result::Result<(), Fault> {
+pub(crate) async fn serve(
+    ground: &Arc<FleetModel>,
+    host: &str,
+    port: u16,
+    timeout: u64,
+) -> std::result::Result<(), FleetFault> {
     let functions = ground.clone();
     // Sessions of the scheduler know the functions of the fleet.
     let session = move |config: SessionConfig| {
@@ -66,7 +71,7 @@ pub(crate) async fn serve(ground: &Arc<Ground>, host: &str, port: u16, timeout: 
     };
     // Names of hosts are not resolved here.
     let address = format!("{host}:{port}").parse().map_err(|error| {
-        Fault::new(format!(
+        FleetFault::new(format!(
             "`{host}:{port}` is not an address: {error}; give a numeric host such as 127.0.0.1"
         ))
     })?;
@@ -84,7 +89,7 @@ pub(crate) async fn serve(ground: &Arc<Ground>, host: &str, port: u16, timeout: 
     };
     start_server(BallistaCluster::new(Arc::new(cluster), jobs), address, Arc::new(config))
         .await
-        .map_err(Fault::new)
+        .map_err(FleetFault::new)
 }
 
 /// Ballista's state of the executors, extended: the loss of an executor cancels all running jobs.
@@ -99,14 +104,14 @@ struct ExecutorCluster {
 
 impl ExecutorCluster {
     /// Cancels all running jobs and returns their number. The scheduler has processed the requests when this returns.
-    async fn end_jobs(&self) -> std::result::Result<usize, Fault> {
+    async fn end_jobs(&self) -> std::result::Result<usize, FleetFault> {
         // All jobs that run, in a fixed sequence.
         let mut running = Vec::new();
-        let all = self.jobs.get_all_jobs().await.map_err(Fault::new)?;
+        let all = self.jobs.get_all_jobs().await.map_err(FleetFault::new)?;
         let mut all: Vec<JobId> = all.into_iter().collect();
         all.sort_by_key(JobId::to_string);
         for job in all {
-            let told = self.jobs.get_job_status(&job).await.map_err(Fault::new)?;
+            let told = self.jobs.get_job_status(&job).await.map_err(FleetFault::new)?;
             if matches!(told.and_then(|told| told.status), Some(Status::Running(_))) {
                 running.push(job);
             }
@@ -117,12 +122,12 @@ impl ExecutorCluster {
         // Cancel them by the scheduler's own interface.
         let mut scheduler = SchedulerGrpcClient::connect(format!("http://{}", self.address))
             .await
-            .map_err(Fault::new)?;
+            .map_err(FleetFault::new)?;
         for job in &running {
             let ended = CancelJobParams {
                 job_id: job.to_string(),
             };
-            scheduler.cancel_job(ended).await.map_err(Fault::new)?;
+            scheduler.cancel_job(ended).await.map_err(FleetFault::new)?;
         }
         Ok(running.len())
     }

@@ -10,7 +10,7 @@ use datafusion::arrow::datatypes::{DataType, Field, FieldRef, Fields};
 use datafusion::common::{Result, ScalarValue, exec_err};
 use datafusion::logical_expr::function::{AccumulatorArgs, StateFieldsArgs};
 use datafusion::logical_expr::{Accumulator, AggregateUDFImpl, Signature, TypeSignature, Volatility};
-use modelmill_fleet::{Ground, Summary};
+use modelmill_fleet::{FleetModel, FleetSummary};
 
 use crate::samples::{GroupSamples, external_error};
 
@@ -40,7 +40,7 @@ impl AggregateKind {
 #[derive(Clone)]
 pub struct FleetAggregate {
     /// The plan with its derived model.
-    ground: Arc<Ground>,
+    ground: Arc<FleetModel>,
     /// The result.
     answer: AggregateKind,
     /// Types of the arguments.
@@ -51,7 +51,7 @@ pub struct FleetAggregate {
 
 impl FleetAggregate {
     /// The aggregate with a kind of result.
-    pub fn new(ground: Arc<Ground>, answer: AggregateKind) -> Self {
+    pub fn new(ground: Arc<FleetModel>, answer: AggregateKind) -> Self {
         // Samples are the name of a recording and its columns; summaries are bytes.
         let columns = ground.columns();
         let numbers = vec![DataType::Float64; columns.len()];
@@ -157,7 +157,7 @@ struct SummaryAccumulator {
     /// Samples so far, if the arguments are samples.
     samples: GroupSamples,
     /// Sum of the summaries so far, if the arguments are summaries.
-    sum: Option<Summary>,
+    sum: Option<FleetSummary>,
     /// Whether the arguments are samples.
     of_samples: bool,
 }
@@ -166,8 +166,8 @@ impl SummaryAccumulator {
     /// Adds a summary; fails if it belongs to another plan.
     fn add(&mut self, bytes: &[u8]) -> Result<()> {
         // A summary of another plan cannot be added.
-        let one = Summary::of_bytes(bytes).map_err(external_error)?;
-        self.fleet.ground.check(&one).map_err(external_error)?;
+        let one = FleetSummary::from_bytes(bytes).map_err(external_error)?;
+        self.fleet.ground.check_plan(&one).map_err(external_error)?;
         match &mut self.sum {
             None => self.sum = Some(one),
             Some(sum) => sum.merge(&one).map_err(external_error)?,
@@ -189,7 +189,7 @@ impl SummaryAccumulator {
     }
 
     /// The summary of the group. Samples are summarised only here, because all samples of a recording are needed.
-    fn finish_sum(&mut self) -> Result<Option<Summary>> {
+    fn finish_sum(&mut self) -> Result<Option<FleetSummary>> {
         if self.of_samples {
             let fleet = self.fleet.clone();
             return self.samples.summary(&fleet.ground, &fleet.columns).map(Some);
@@ -235,7 +235,7 @@ impl Accumulator for SummaryAccumulator {
         match self.fleet.answer {
             AggregateKind::Summary | AggregateKind::Merged => Ok(ScalarValue::Binary(sum.map(|sum| sum.bytes()))),
             AggregateKind::Parameters => {
-                let sum = sum.unwrap_or_else(|| self.fleet.ground.empty());
+                let sum = sum.unwrap_or_else(|| self.fleet.ground.empty_summary());
                 // A group without a usable recording has counts and no parameters.
                 let fit = self.fleet.ground.solve(&sum).ok();
                 let n = self.fleet.ground.parameters().len();

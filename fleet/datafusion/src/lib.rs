@@ -26,13 +26,13 @@ use std::sync::Arc;
 
 use datafusion::execution::context::SessionContext;
 use datafusion::logical_expr::AggregateUDF;
-use modelmill_fleet::Ground;
+use modelmill_fleet::FleetModel;
 
 pub use aggregates::{AggregateKind, FleetAggregate};
 pub use recordings::RecordingsFunction;
 
 /// All aggregates over a plan, for the function registries of schedulers and executors.
-pub fn aggregates(ground: &Arc<Ground>) -> Vec<Arc<AggregateUDF>> {
+pub fn aggregates(ground: &Arc<FleetModel>) -> Vec<Arc<AggregateUDF>> {
     [AggregateKind::Summary, AggregateKind::Merged, AggregateKind::Parameters]
         .into_iter()
         .map(|answer| Arc::new(AggregateUDF::from(FleetAggregate::new(ground.clone(), answer))))
@@ -40,7 +40,7 @@ pub fn aggregates(ground: &Arc<Ground>) -> Vec<Arc<AggregateUDF>> {
 }
 
 /// Registers all functions over a plan with a session.
-pub fn register(session: &SessionContext, ground: &Arc<Ground>) {
+pub fn register(session: &SessionContext, ground: &Arc<FleetModel>) {
     for function in aggregates(ground) {
         session.register_udaf(function.as_ref().clone());
     }

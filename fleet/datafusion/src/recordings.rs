@@ -18,8 +18,8 @@ use datafusion::physical_plan::ExecutionPlan;
 use datafusion::physical_plan::stream::RecordBatchStreamAdapter;
 use datafusion::physical_plan::streaming::PartitionStream;
 use futures::{StreamExt, TryStreamExt};
-use modelmill_fleet::folder::{File, Found, by_robot, robots};
-use modelmill_fleet::{Ground, Summary};
+use modelmill_fleet::folder::{FleetFile, FolderEntry, group_by_robot, robots};
+use modelmill_fleet::{FleetModel, FleetSummary};
 
 use crate::samples::external_error;
 
@@ -28,12 +28,12 @@ use crate::samples::external_error;
 #[derive(Clone)]
 pub struct RecordingsFunction {
     /// The plan with its derived model.
-    ground: Arc<Ground>,
+    ground: Arc<FleetModel>,
 }
 
 impl RecordingsFunction {
     /// The function over a plan.
-    pub fn new(ground: Arc<Ground>) -> Self {
+    pub fn new(ground: Arc<FleetModel>) -> Self {
         Self { ground }
     }
 }
@@ -78,7 +78,7 @@ enum RecordingsFolder {
 
 impl RecordingsFolder {
     /// The source of the files, and all recordings with their robots.
-    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, File)>)> {
+    async fn files(&self, session: &dyn Session) -> Result<(RecordingsSource, Vec<(String, FleetFile)>)> {
         let (source, robots) = match self {
             Self::Path(folder) => (RecordingsSource::Disk, robots(folder).map_err(external_error)?),
             Self::Stored(url) => {
@@ -94,13 +94,13 @@ impl RecordingsFolder {
                         .flatten()
                         .map(|part| part.as_ref().to_owned())
                         .collect();
-                    Found {
+                    FolderEntry {
                         name: parts.join("/"),
                         path: object.location.as_ref().into(),
                         version: format!("{} {}", object.size, object.last_modified.timestamp_micros()),
                     }
                 });
-                let robots = by_robot(url, found).map_err(external_error)?;
+                let robots = group_by_robot(url, found).map_err(external_error)?;
                 (RecordingsSource::Store(store), robots)
             }
         };
@@ -123,7 +123,7 @@ enum RecordingsSource {
 impl RecordingsSource {
     /// The summary of a file. A fault of the recording is part of the summary; a store that does not answer is an
     /// error.
-    async fn summary(&self, ground: Arc<Ground>, file: File) -> Result<Summary> {
+    async fn summary(&self, ground: Arc<FleetModel>, file: FleetFile) -> Result<FleetSummary> {
         // Objects of a store are read completely; files are opened by the library.
         let bytes = match self {
             Self::Disk => None,
@@ -144,7 +144,7 @@ impl RecordingsSource {
 /// The table. Files are listed when it is scanned, because a store is only accessible then.
 struct RecordingsTable {
     /// The plan with its derived model.
-    ground: Arc<Ground>,
+    ground: Arc<FleetModel>,
     /// The folder of the recordings.
     folder: RecordingsFolder,
     /// Columns of the table.
@@ -212,13 +212,13 @@ fn schema() -> SchemaRef {
 /// A partition of the table: some of the files.
 struct RecordingsPartition {
     /// The plan with its derived model.
-    ground: Arc<Ground>,
+    ground: Arc<FleetModel>,
     /// Columns of the table.
     schema: SchemaRef,
     /// The source of the files.
     source: RecordingsSource,
     /// Robots with their files.
-    files: Vec<(String, File)>,
+    files: Vec<(String, FleetFile)>,
 }
 
 impl std::fmt::Debug for RecordingsPartition {
@@ -248,7 +248,7 @@ impl PartitionStream for RecordingsPartition {
 }
 
 /// The row of one recording.
-fn summary_row(schema: SchemaRef, robot: &str, file: &File, summary: &Summary) -> Result<RecordBatch> {
+fn summary_row(schema: SchemaRef, robot: &str, file: &FleetFile, summary: &FleetSummary) -> Result<RecordBatch> {
     let text = |text: &str| Arc::new(StringArray::from(vec![text])) as ArrayRef;
     let bad = summary.bad.first().map(|bad| bad.says.as_str());
     let columns: Vec<ArrayRef> = vec![

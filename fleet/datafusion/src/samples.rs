@@ -6,7 +6,7 @@ use datafusion::arrow::array::{Array, ArrayRef, Float64Array, StringArray};
 use datafusion::arrow::compute::cast;
 use datafusion::arrow::datatypes::DataType;
 use datafusion::common::{DataFusionError, Result, exec_err};
-use modelmill_fleet::{Ground, Summary};
+use modelmill_fleet::{FleetModel, FleetSummary};
 
 /// Samples by recording, column by column, in the order of their arrival.
 #[derive(Debug, Default)]
@@ -74,8 +74,8 @@ impl GroupSamples {
     }
 
     /// The sum of the summaries of all recordings; the samples are consumed.
-    pub(crate) fn summary(&mut self, ground: &Ground, names: &[String]) -> Result<Summary> {
-        let mut sum = ground.empty();
+    pub(crate) fn summary(&mut self, ground: &FleetModel, names: &[String]) -> Result<FleetSummary> {
+        let mut sum = ground.empty_summary();
         for (recording, columns) in std::mem::take(&mut self.recordings) {
             let columns = names.iter().cloned().zip(columns).collect();
             sum.merge(&ground.summarise(&recording, columns))
@@ -151,6 +151,6 @@ fn take_bytes<'a>(left: &mut &'a [u8], n: usize) -> Option<&'a [u8]> {
 }
 
 /// A fault of the library as an error of DataFusion.
-pub(crate) fn external_error(fault: modelmill_fleet::Fault) -> DataFusionError {
+pub(crate) fn external_error(fault: modelmill_fleet::FleetFault) -> DataFusionError {
     DataFusionError::External(Box::new(fault))
 }
