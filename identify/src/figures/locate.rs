@@ -143,13 +143,13 @@ fn densest_region(
         return None;
     }
     let around = if range[0] < 0.0 && range[0].to_bits() == (-range[1]).to_bits() {
-        " (around zero)"
+        ", around zero"
     } else {
         ""
     };
     let says = format!(
-        "{:.0} % of the squared error of {channel} lies where {name} is between {} and {}{around}, \
-         in {:.0} % of the samples",
+        "{:.0} % of the squared error of {channel} is in the samples with {name} between {} and {}{around} \
+         ({:.0} % of all samples)",
         100.0 * share,
         with_digits(range[0], 3),
         with_digits(range[1], 3),

@@ -127,8 +127,8 @@ pub fn figures(named: &[(&str, &ErrorFigures)]) -> Vec<String> {
     lines.push("  nrms: rms of the error divided by rms of the measured force".to_owned());
     if let Some(band) = named.iter().find_map(|(_, figures)| figures.band.as_ref()) {
         lines.push(format!(
-            "  in band: the same error after both forces went through a low-pass at {} Hz, without {} of the samples at each \
-             end",
+            "  in band: the same error with measured and calculated force low-pass filtered at {} Hz, without {} of the \
+             samples at each end",
             significant(band.cutoff_hz, 3),
             percent(Some(TRIMMED_PART)),
         ));

@@ -56,15 +56,12 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
     };
     // A range of equal size on both sides of zero is a range of magnitudes, as for rates near standstill.
     let is_around_zero = low < 0.0 && low.to_bits() == (-high).to_bits();
-    let lies = if is_around_zero {
-        format!("within {} {unit} of zero {name}", significant(high, 3))
-    } else {
-        format!(
-            "where {name} is between {} and {} {unit}",
-            significant(low, 3),
-            significant(high, 3)
-        )
-    };
+    let around = if is_around_zero { ", around zero" } else { "" };
+    let interval = format!(
+        "{name} between {} and {} {unit}{around}",
+        significant(low, 3),
+        significant(high, 3)
+    );
     // Times of several recordings overlap, so a region in time names its file.
     let file = region.says.split_once(": ").map(|(file, _)| file);
     let of = match file {
@@ -72,10 +69,10 @@ pub(crate) fn sentence(region: &ErrorRegion, model: &Model) -> String {
         _ => String::new(),
     };
     format!(
-        "{:.0} % of the squared error of {}{of} lies {}, in {:.0} % of the samples",
+        "{:.0} % of the squared error of {}{of} is in the samples with {} ({:.0} % of all samples)",
         100.0 * region.share,
         region.channel,
-        lies.replace('-', "−"),
+        interval.replace('-', "−"),
         100.0 * region.samples
     )
 }
