@@ -157,7 +157,7 @@
     const at = before(line);
     if (!at) return null;
     const table = tableOf(lines, row);
-    // Of a variant, all fields are optional.
+    // All fields of a variant are optional.
     let one = { properties: schema.properties };
     for (const name of [...table.path, ...at.path]) one = one && within(one, name);
     const start = caret - line.length + at.start;
@@ -167,7 +167,7 @@
       const here = properties(one);
       const there = at.path.length ? line.slice(line.lastIndexOf('{')) : table.lines.join('\n');
       const isThere = (name) => new RegExp(`(^|[\\n{,])\\s*${name}\\s*=`).test(there);
-      // Tables of the file itself begin with a bracket.
+      // Tables at the top level of the file begin with a bracket, so they are not offered as keys.
       const isTable = (of) => !table.path.length && !at.path.length && (properties(of).name || (resolved(of) || {}).type === 'object');
       const all = special || Object.entries(here).filter(([, of]) => !isTable(of)).map(([name, of]) => ({ name, says: (resolved(of) || {}).description || '' }));
       return { ...rest, all: all.filter((offer) => offer.name === at.word || !isThere(offer.name)).map((offer) => ({ ...offer, put: `${offer.name} = ` })) };

@@ -53,7 +53,7 @@
       const [low, high, rate, acceleration] = [...row.querySelectorAll('input')];
       const { name } = row.dataset;
       if (low.value.trim() === '' || high.value.trim() === '')
-        throw new Error(`${name} has no limits; enter a smallest and a largest position here, or under [limits.coordinates] in the model file`);
+        throw new Error(`${name} has no limits; enter the smallest and the largest position here, or under [limits.coordinates] in the model file`);
       const isNew = (input) => input.value.trim() !== input.dataset.was;
       if (isNew(low) || isNew(high)) all.push(`${name}=${low.value.trim()}:${high.value.trim()}`);
       for (const [input, [, ending]] of [[rate, KINDS[1]], [acceleration, KINDS[2]]])
@@ -71,7 +71,7 @@
     if (told.failed) box.append(make('p', told.failed, 'alias'));
     const plan = told.found;
     if (!plan) return;
-    if (!told.of_this_text) box.append(make('p', 'The text was changed since; search again.', 'alias'));
+    if (!told.of_this_text) box.append(make('p', 'This result is of an earlier text. Search again for the current text.', 'alias'));
     box.append(make('p', plan.says, 'verdict'));
     for (const note of plan.notes) box.append(make('p', note.says));
     const table = make('table');

@@ -133,12 +133,12 @@
         show(told);
       } catch (error) {
         if (error.status === 409) {
-          // Another window was faster: its text is loaded, unless there is unsent typing here.
+          // Another window sent a text first: it is loaded, unless this window has typed text that was not sent.
           const told = await news(0).catch(() => null);
           if (!told) { say(error.message); break; }
           if (isTyped) {
             base = told.revision;
-            say('The text was changed in another window while you typed. Your text is kept here.');
+            say('The text was changed in another window while you typed. This window keeps your text.');
           } else follow(told);
           continue;
         }
@@ -176,7 +176,7 @@
     by('save').disabled = !view.changed;
     by('banner').hidden = !view.conflict;
     by('banner').firstElementChild.textContent =
-      'Another program changed the file while this text had unsaved changes. Nothing is written before you choose.';
+      'Another program changed the file, and this text has unsaved changes. Nothing is written until you choose one of the two texts.';
     lines();
     faults();
     for (const one of document.querySelectorAll('.pane')) one.classList.toggle('stale', !view.valid);
@@ -216,7 +216,7 @@
   const equations = () => {
     const { model } = view;
     by('made').textContent =
-      `${model.products} products with an effect on the drives, ${model.base.length} base parameters; derived in ${(1000 * view.seconds).toFixed(0)} ms.`;
+      `${model.products} products of parameters with an effect on the drives, ${model.base.length} base parameters (combinations that can be identified); derived in ${(1000 * view.seconds).toFixed(0)} ms.`;
     by('base').tBodies[0].replaceChildren(...model.base.map((one) => {
       const row = make('tr', undefined, one.change);
       cell(row, one.name);
@@ -242,7 +242,7 @@
     const rows = view.ladder.map((one) => row(one.what, one.errors));
     if (errors && errors.revision === view.revision) {
       const brief = (f) => ({ fit: f.fit && f.fit.nrms, check: f.check && f.check.nrms });
-      rows.push(row('now', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
+      rows.push(row('current text', { nominal: brief(errors.nominal), identified: brief(errors.identified) }));
     }
     by('rungs').tBodies[0].replaceChildren(...rows);
     window.enlivenTables(by('rungs'));
@@ -309,7 +309,7 @@
     one.classList.toggle('stale', isOld);
     const told = one.previousElementSibling;
     const isTold = told.classList.contains('of-before');
-    if (isOld && !isTold) one.before(make('p', 'The text was changed since: this is the result of the text before. Use the button again for the current text.', 'alias of-before'));
+    if (isOld && !isTold) one.before(make('p', 'This result is of an earlier text. Use the button again for the current text.', 'alias of-before'));
     if (!isOld && isTold) told.remove();
   };
   const made_of = (id, revision) => { by(id).dataset.revision = revision; mark_stale(id); };
@@ -531,10 +531,10 @@
       box.append(make('p', `These recordings cannot distinguish ${effect.kind.replaceAll('_', ' ')} from ${others}. ${effect.separate_by || ''}`));
       if (effect.separate_command) box.append(make('code', effect.separate_command));
     }
-    for (const one of found.disturbances) box.append(make('p', `In the recordings: ${one.says}.`));
+    for (const one of found.disturbances) box.append(make('p', `Disturbance in the recordings: ${one.says}.`));
     const figure = make('figure', undefined, 'still');
     figure.innerHTML = found.ladder;
-    figure.prepend(make('figcaption', `Error relative to the force, judged ${found.judged}`));
+    figure.prepend(make('figcaption', `Error relative to the force ${found.judged}`));
     box.append(figure);
     window.enlivenPictures(box);
     const list = make('ul');
@@ -630,7 +630,7 @@
         if (told.revision !== base) follow(told); else show(told);
         follow_diagnosis().catch(() => {});
       } catch (error) {
-        by('state').textContent = `the program does not answer (${error.message}); keep this page open, your text is still here`;
+        by('state').textContent = `the program does not answer (${error.message}). Keep this page open: it still has your text`;
         await new Promise((done) => setTimeout(done, 2000));
       }
     }

@@ -164,7 +164,7 @@
   const draw = async (beside) => {
     const { at, from } = stands.seen;
     by('both').innerHTML = await ask('picture', { at, from, names: true, frames: false, shadow: true, beside });
-    for (const one of by('both').querySelectorAll('svg')) one.setAttribute('aria-label', 'The mechanism, the first one as a shadow');
+    for (const one of by('both').querySelectorAll('svg')) one.setAttribute('aria-label', 'Both mechanisms; the one before is drawn as a shadow');
   };
 
   const compare = asker('variant', async () => {
@@ -183,7 +183,7 @@
       const told = await ask('variant', { beside });
       const { along } = told;
       const pieces = [];
-      if (told.same) pieces.push(make('p', 'Both texts are the same: edit the text to see what changes.'));
+      if (told.same) pieces.push(make('p', 'Both texts are the same. Edit the text to see what the edit changes.'));
       if (told.refused) pieces.push(make('p', told.refused, 'alias'));
       if (along) {
         for (const note of along.notes) pieces.push(make('p', note.says, note.severity === 'warning' ? 'alias' : ''));

@@ -268,7 +268,7 @@ fn adds_as_the_command_does(browser: &mut Browser, window: &Window, bench: &Work
         added[1]
     );
     assert!(
-        (added[2].as_str()).is_some_and(|says| says.contains("of the text before")),
+        (added[2].as_str()).is_some_and(|says| says.contains("of an earlier text")),
         "the diagnosis is of another text: {}",
         added[2]
     );
