@@ -93,7 +93,7 @@ fn adding_what_cannot_be_is_refused() {
         (
             &["spring", "--at", "spindle_left", "--set", "k=stiff"][..],
             2,
-            "no finite number",
+            "not a finite number",
         ),
         (&["spring", "--at", "spindle_left", "--set", "k"][..], 2, "NAME=VALUE"),
         (&["spring"][..], 2, "--at"),
