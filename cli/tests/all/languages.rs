@@ -356,7 +356,7 @@ fn what_only_rust_has_is_refused_with_a_word() {
     assert_eq!(output.status.code(), Some(2));
     let says = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        says.contains("--reactions goes with --language rust and c99 only"),
+        says.contains("--reactions is available with --language rust and c99 only"),
         "{says}"
     );
     assert!(!out.exists());

@@ -105,7 +105,7 @@ fn numbers_of_the_model_file_are_not_identified() {
     for (truth, fits) in [(2.0, true), (2.5, false)] {
         let data = whole("known", 1500, truth, 3.0);
         let (err, fit) = both(&["identify", &known, "--data", &data]);
-        assert!(err.contains("it is known"), "{err}");
+        assert!(err.contains("It is known and not identified"), "{err}");
         let parameters = fit["parameters"].as_array().expect("parameters");
         let [one, friction] = parameters.as_slice() else {
             panic!("{fit:#}");

@@ -115,7 +115,7 @@ fn a_folder_that_cannot_be_is_said_before_anything_is_done() {
     std::fs::write(&file, "").expect("a file");
     let (model, fit) = (model("spidermill.toml"), run("plain-fit.csv"));
     let says = refused(1, &["report", &model, "--data", &fit, "--out", &format!("{file}/page")]);
-    assert!(says.contains("cannot be made") && says.contains("--out"), "{says}");
+    assert!(says.contains("cannot be created") && says.contains("--out"), "{says}");
 }
 
 /// Opens a page without a network, lets `exercise.js` use it, and returns what that wrote down; `None` without a

@@ -353,7 +353,7 @@ fn what_is_misspelt_is_said() {
         ),
         (
             vec!["--separate", "spring@spindle_left:kk=1", "--from", LEFT],
-            "no `kk`",
+            "no parameter or constant `kk`",
         ),
     ] {
         let says = refusal(1, &more);
