@@ -233,7 +233,7 @@ fn the_tour_tells_the_story_and_writes_its_files() {
     let story = printed(&["tour", "--out", &out]);
     for part in [
         "p3_min = m3*dc3 + 1/2*d3*m4",
-        "Compare: where does the model fail?",
+        "Compare: where is the error large?",
         "rod inertia (spindle_left, spindle_right)",
         "+kind = \"rod_inertia\"",
         "Identify again: the error falls",

@@ -62,7 +62,7 @@ pub fn effects(effects: &[LocatedEffect]) -> String {
 pub fn rung(rung: &SelectionStep) -> String {
     // The first step is the model of the file.
     if rung.added.is_empty() && rung.dropped.is_empty() {
-        return "the model as it is".to_owned();
+        return "the given model".to_owned();
     }
     // Signs show what was added and what became unnecessary.
     let mut says = Vec::new();
@@ -103,15 +103,17 @@ pub fn floor_label(noise_floor: f64) -> &'static str {
 pub fn refusal(reason: &str, has_effects: bool) -> &str {
     match reason {
         // Words of the search at the left, sentences at the right.
-        "sign" => "its value would have the wrong sign",
-        "explains nothing that is left" if has_effects => "redundant: the effects found already explain it",
+        "sign" => "a parameter would have an impossible sign",
+        "explains nothing that is left" if has_effects => {
+            "redundant: it explains almost nothing in addition to the effects found"
+        }
         "explains nothing that is left" => "explains almost none of the error",
         "another explains more" => "another candidate explains more",
         "what is left is rounding" => "only noise is left to explain",
         "not supported by the check" => "not confirmed on the validation run",
         "not supported by cross-validation" => "not confirmed by cross-validation",
         "not worth its parameters" => "the gain is too small for its number of parameters",
-        "the model says it already" => "the model already has it",
+        "the model says it already" => "linearly dependent on the columns of the model",
         "no finite value somewhere along the recordings" => "its formula has no finite value at some samples",
         other => other,
     }

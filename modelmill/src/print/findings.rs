@@ -230,8 +230,8 @@ impl DiagnosisFindings {
             &[
                 ("drive", ColumnAlignment::Left),
                 ("noise", ColumnAlignment::Right),
-                ("not repeatable", ColumnAlignment::Right),
-                ("unexplained by the model", ColumnAlignment::Right),
+                ("disturbances", ColumnAlignment::Right),
+                ("repeatable, unexplained", ColumnAlignment::Right),
             ],
             &rows,
         ));

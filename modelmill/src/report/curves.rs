@@ -57,7 +57,11 @@ pub fn section(before: &ModelVersion, after: Option<&ModelVersion>, names: [&str
         let run = &before.runs[*k];
         let title = format!(
             "{} {}",
-            if run.is_check { "Validation run" } else { "Fitted run" },
+            if run.is_check {
+                "Validation run"
+            } else {
+                "Run used for the fit"
+            },
             run.name
         );
         let open = if place == 0 { " open" } else { "" };
@@ -119,8 +123,7 @@ fn panels(
         ],
         values,
     };
-    // "model as it is" has an "error as it is".
-    let error = |name: &str| format!("error {}", name.trim_start_matches("model "));
+    let error = |name: &str| format!("error of the {name}");
     // The measured force, the model as it is, and the model with effects.
     let run = &before.runs[k];
     let mut forces = vec![

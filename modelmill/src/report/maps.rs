@@ -145,7 +145,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, varia
             sums.map(|(count, sum)| (count >= LEAST).then(|| (sum / count as f64).sqrt()))
                 .collect()
         };
-        let maps: Vec<(&str, Vec<Option<f64>>)> = [Some(("model as it is", sizes(&error)))]
+        let maps: Vec<(&str, Vec<Option<f64>>)> = [Some(("given model", sizes(&error)))]
             .into_iter()
             .chain([rest.map(|rest| ("with the effects", sizes(&rest)))])
             .flatten()
@@ -159,7 +159,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>, varia
         let picture = picture(&maps, &grid, &names, unit);
         let _ = writeln!(
             html,
-            "<figure class=\"still\"><figcaption><b>{}: size of the error over {} and {}</b></figcaption>\n{picture}</figure>",
+            "<figure class=\"still\"><figcaption><b>{}: rms error over {} and {}</b></figcaption>\n{picture}</figure>",
             escape(drive),
             escape(&variables[i].0),
             escape(&variables[j].0),

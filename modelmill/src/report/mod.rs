@@ -35,8 +35,8 @@ pub fn ladder(findings: &DiagnosisFindings) -> String {
 /// The key of the colours: the model before and after the effects.
 fn legend(with_after: bool) -> &'static str {
     if with_after {
-        "<span class=\"key c-before\">as it is</span> <span class=\"key c-after\">with the effects</span>"
+        "<span class=\"key c-before\">given model</span> <span class=\"key c-after\">with the effects</span>"
     } else {
-        "<span class=\"key c-before\">as it is</span>"
+        "<span class=\"key c-before\">given model</span>"
     }
 }

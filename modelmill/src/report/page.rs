@@ -105,9 +105,9 @@ fn summary(findings: &DiagnosisFindings) -> String {
     // Tiles: verdict, error before and after, noise.
     let mut tiles = vec![("verdict", word.to_owned())];
     if let (Some(first), Some(last)) = (diagnosis.steps.first(), diagnosis.steps.last()) {
-        tiles.push(("error as it is", percent(Some(first.check))));
+        tiles.push(("error of the given model", percent(Some(first.check))));
         if diagnosis.steps.len() > 1 {
-            tiles.push(("with the effects", percent(Some(last.check))));
+            tiles.push(("error with the effects", percent(Some(last.check))));
         }
     }
     // Errors cannot fall below the noise.
@@ -133,7 +133,7 @@ fn ladder_section(findings: &DiagnosisFindings) -> String {
         "<figure class=\"still\"><figcaption><b>Error relative to the force</b> <span class=\"key c-fit\">fit</span> \
          <span class=\"key c-after\">{}</span></figcaption>\n{}</figure>\n{}\n\
          <p>All errors are nrms: rms of measured minus calculated force, divided by rms of the measured force. Each step was \
-         judged {}.</p>\n{}",
+         tested {}.</p>\n{}",
         findings.validation.phrase(),
         ladder::picture(&diagnosis.steps, diagnosis.noise_floor, findings.validation),
         tables::ladder(findings),
@@ -244,12 +244,12 @@ fn effects(findings: &DiagnosisFindings, spelling: &dyn StepSpelling) -> String 
 /// Forces over time, with help for the mouse.
 fn curves_section(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p class=\"script-only\">Mouse wheel: zoom. Drag: move. Shift and drag: zoom to a segment. Double click: show all. \
+        "<p class=\"script-only\">Mouse wheel: zoom. Drag: move. Shift and drag: zoom to a time interval. Double click: show all. \
          Keys: + and −, arrows, 0. Click on a name to hide its curve. Click on a number of a table to copy it.</p>\n{}",
         curves::section(
             &findings.before,
             findings.after.as_ref().ok(),
-            ["model as it is", "with the effects"]
+            ["given model", "model with the effects"]
         )
     )
 }
@@ -259,11 +259,11 @@ fn location(findings: &DiagnosisFindings) -> String {
     // Both models are shown if the second one could be built.
     let after = findings.after.as_ref().ok();
     let mut html = String::new();
-    html.push_str(&sentences(&findings.places, "The error of the model as it is"));
+    html.push_str(&sentences(&findings.places, "The error of the given model"));
     if !findings.places.regions.is_empty() {
         let _ = writeln!(
             html,
-            "<p>Each picture shows mean and standard deviation of the error over one variable. The region is shaded. {}</p>",
+            "<p>Each picture shows mean and standard deviation of the error over one variable. The range named in its caption is shaded. Each picture looks at one variable alone, so the ranges overlap. {}</p>",
             legend(after.is_some())
         );
         html.push_str(&regions::figures(
@@ -301,7 +301,7 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
     if !places.rounding.is_empty() {
         let _ = writeln!(
             html,
-            "<p>{what} of {} is rounding of the recorded numbers: there is nothing to find.</p>",
+            "<p>{what} of {} is only rounding error of the recorded numbers, so it contains no further effect.</p>",
             escape(&places.rounding.join(", "))
         );
     } else if places.regions.is_empty() {
@@ -316,10 +316,10 @@ fn sentences(places: &ErrorLocations, what: &str) -> String {
 /// Table of all candidates with an explanation of its columns.
 fn candidates(findings: &DiagnosisFindings) -> String {
     format!(
-        "<p>Every kind of the library at every possible place. The first share is the part of the squared error that the candidate \
-         would explain alone. The gain is the part of the squared residual that it explains in addition to the effects found; for \
-         an effect that was found it is the loss without it.\
-         <span class=\"script-only\"> Click on a head to sort.</span></p>\n{}",
+        "<p>The table has every kind of effect and fault at every place (drive, joint, point, part) where it can act. The first share is \
+         the part of the squared error that the candidate alone would remove. The gain is the part of the squared residual that it \
+         removes in addition to the effects found; for an effect that was found, in addition to the other effects.\
+         <span class=\"script-only\"> Click on the heading of a column to sort.</span></p>\n{}",
         tables::candidates(findings)
     )
 }
@@ -332,7 +332,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
     let mut html = String::new();
     match &findings.after {
         Ok(after) => {
-            html.push_str("<p>Base parameters of the model with the effects, fitted with each drive weighted by its residual. Standard deviations allow for residuals that are correlated in time.</p>\n");
+            html.push_str("<p>Base parameters of the model with the effects, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(after));
             let _ = writeln!(
                 html,
@@ -341,7 +341,7 @@ fn parameters(findings: &DiagnosisFindings) -> String {
             );
         }
         Err(_) => {
-            html.push_str("<p>Base parameters, fitted with each drive weighted by its residual. Standard deviations allow for residuals that are correlated in time.</p>\n");
+            html.push_str("<p>Base parameters, fitted by weighted least squares: the equations of each drive are divided by the standard deviation of its residual. The standard deviations below take into account that residuals are correlated in time.</p>\n");
             html.push_str(&tables::parameters(&findings.before));
         }
     }

@@ -126,7 +126,7 @@ pub(crate) fn figures(before: &ModelVersion, after: Option<&ModelVersion>) -> St
         let unit = force_unit(&before.model, d);
         let _ = write!(
             html,
-            "<figure class=\"still\"><figcaption><b>{}: error over frequency, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
+            "<figure class=\"still\"><figcaption><b>{}: amplitude spectral density of the error, {unit}/√Hz</b> {}</figcaption>\n{}</figure>\n",
             escape(drive),
             super::legend(after.is_some()),
             picture.finish(&format!("spectrum of the error of {drive}"))

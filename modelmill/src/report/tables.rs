@@ -99,8 +99,8 @@ pub(crate) fn ladder(findings: &DiagnosisFindings) -> String {
             "#error, fit",
             &check,
             "#squared error explained",
-            "#that share / its std",
-            "#independent samples",
+            "#t value of the decrease",
+            "#effective samples",
         ],
         &rows,
     )
@@ -140,7 +140,7 @@ pub(crate) fn drives(findings: &DiagnosisFindings) -> String {
         })
         .collect();
     // The column of the model with effects exists only if it could be built.
-    let mut head = vec!["drive", "#error of the model as it is"];
+    let mut head = vec!["drive", "#error of the given model"];
     if findings.after.is_ok() {
         head.push("#error with the effects");
     }
@@ -367,7 +367,7 @@ pub(crate) fn parameters(version: &ModelVersion) -> String {
             "#identified",
             "#std",
             "unit",
-            "#difference to nominal / std",
+            "#|identified − nominal| / std",
         ],
         &rows,
     )

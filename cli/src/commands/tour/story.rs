@@ -73,9 +73,10 @@ impl TourText {
         let mechanism = &model.derivation.mechanism;
         let reduction = &model.derivation.reduction;
         self.paragraph(&format!(
-            "A parallel robot carries a platform on two cranks, each pushed by a ball screw. Its model file has {}, {} and {}. \
-             The forces of the screws are linear in {} of masses, lengths and inertias, but many of these have the same effect. \
-             Only {} combinations can be identified from measurements. They are found symbolically, in exact arithmetic:",
+            "In this planar parallel robot two cranks, each driven by a ball screw, carry a platform through two couplers. Its \
+             model file has {}, {} and {}. The forces of the screws are linear in {} of masses, lengths and inertias, but the \
+             columns of many products are linearly dependent. Only {} combinations can be identified from measurements. They are \
+             found symbolically, in exact arithmetic:",
             count(mechanism.parts.len(), "body", "bodies"),
             count(mechanism.loops.len(), "loop", "loops"),
             count(mechanism.drives.len(), "drive", "drives"),
@@ -89,11 +90,12 @@ impl TourText {
 
     /// The error of the model with nominal values, and where it is largest.
     pub(super) fn compare(&mut self, place: &TourFolder, model: &Model, seen: &TourComparison) {
-        self.heading("2  Compare: where does the model fail?");
+        self.heading("2  Compare: where is the error large?");
         self.paragraph(&format!(
-            "A third-party multibody simulation of the robot, with eleven groups of bodies, gives the recording. It contains one \
-             effect that the model file lacks. With the masses of the drawings the error of the model is {} of the force (nrms: \
-             rms of the error divided by rms of the measured force). First the force of one screw, then the error:",
+            "A third-party multibody program simulated the complete robot (eleven groups of bodies) to make this recording. The \
+             simulation contains one effect that the model file lacks. With the nominal parameters of the model file the error \
+             is {} of the force (nrms: rms of the error divided by rms of the measured force). First the force of one ball screw, \
+             then the error, on its own scale:",
             percent(seen.compared.figures.nrms)
         ));
         // The curves of the first drive are an example; the table below lists where all errors are largest.
@@ -119,7 +121,7 @@ impl TourText {
         self.line("Where the error is largest:");
         self.lines(&tables::places(&seen.compared.places));
         self.line("");
-        self.paragraph("This shows where the model fails, not why. The next step finds the cause.");
+        self.paragraph("This shows where the error is large, not its cause. The next step finds the cause.");
         self.command(&format!(
             "compare {} --data {}",
             place.name("spidermill.toml"),
@@ -133,8 +135,9 @@ impl TourText {
         let all = &findings.diagnosis.candidates;
         self.paragraph(&format!(
             "modelmill tries every effect of its library at every place of this mechanism, {} in all: friction of many kinds, \
-             springs, inertias, offsets, delays, rods. It fits them together with the model on one run. It accepts an effect \
-             only if the error also falls on a validation run, which is not fitted.",
+             springs, inertias, offsets, delays, rods. It fits sets of them, each together with the base parameters, to one run. \
+             It accepts an effect only if the error also falls on a validation run, which is not used for the fit. The base \
+             parameters are estimated here, so the first error below is smaller than that with nominal values.",
             count(all.len(), "candidate", "candidates")
         ));
         self.paragraph(&verdict(findings));
@@ -189,8 +192,9 @@ impl TourText {
             return;
         };
         self.paragraph(&format!(
-            "An effect takes a few lines of the model file. Its estimates become nominal values. Comments and layout stay. The \
-             tour writes the result to {}:",
+            "A few lines in the model file describe the effect. The estimates of its parameters become their nominal values: Jr \
+             and Sr are the moment of inertia and the first moment of mass of a rod about its pivot, the same for both screws. \
+             Comments and layout of the file do not change. The tour writes the result to {}:",
             place.name(EDITED)
         ));
         let lines: Vec<String> = difference.lines().map(|line| format!("  {line}")).collect();
@@ -219,9 +223,9 @@ impl TourText {
             self.line("");
         }
         self.paragraph(
-            "The simulation contained this effect: each screw is a rod of 8 kg and 0.9 m that swings about its base. Its moment \
-             of inertia is 8 * 0.9^2 / 3 = 2.16 kg m^2, its first moment is 8 * 0.9 / 2 = 3.6 kg m. The estimates of Jr and Sr \
-             above agree.",
+            "The simulation contained this effect: each screw is a uniform rod (mass 8 kg, length 0.9 m) that rotates about its \
+             base pivot. About this pivot its moment of inertia is 8 * 0.9^2 / 3 = 2.16 kg m^2, and its first moment of mass is \
+             8 * 0.9 / 2 = 3.6 kg m. The estimates of Jr and Sr agree with these values.",
         );
     }
 
@@ -262,7 +266,7 @@ impl TourText {
             }
         }
         self.line("");
-        self.paragraph("Error relative to the force (nrms) on the validation run; logarithmic bars.");
+        self.paragraph("Error relative to the force (nrms) on the validation run. The lengths of the bars are on a logarithmic scale.");
     }
 
     /// The diagnosis of the model as published.
@@ -270,9 +274,11 @@ impl TourText {
         self.heading("6  Diagnose a published model");
         self.paragraph(
             "The paper that describes this robot reports an error of its model. It names two causes: mainly the positions of the \
-             point masses of couplings and platform, and to a small part the contact points of the screws. In its equations the \
-             platform's mass m4 acts at the joint in the balance of forces, but at the middle of the coupler in the balance of \
-             moments. The diagnosis uses a simulation of the same robot, with all parameters fixed at their nominal values:",
+             point masses that replace the coupling elements and the platform, and to a lesser extent the contact points of the \
+             screws on the cranks. In its equations each coupler carries half of the platform's mass m4: in the force balance at \
+             the joint between the couplers, but in the moment balance at the coupler's centre. The diagnosis uses a recording \
+             from a simulation of the same robot. It does not estimate base parameters, but fixes them at their nominal values \
+             (`--held`):",
         );
         self.paragraph(&verdict(findings));
         let diagnosis = &findings.diagnosis;
