@@ -184,7 +184,7 @@ fn recordings_that_give_no_answer_are_named() {
     let mut sum = ground.summarise("good", good);
     for (name, columns, why) in [
         ("twice", twice, "time"),
-        ("dead", dead, "q1 stands still"),
+        ("dead", dead, "q1 is constant"),
         ("missing", missing, "motor_left"),
         ("ragged", ragged, "q3"),
         ("none", Vec::new(), "no sample"),
