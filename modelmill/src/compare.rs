@@ -17,7 +17,7 @@ pub struct ModelComparison {
     pub model: String,
     /// File names of the segments, in order.
     pub files: Vec<String>,
-    /// Error figures, over all drives and for each drive.
+    /// Error metrics, over all drives and for each drive.
     pub figures: ErrorFigures,
     /// Regions in which the error occurs.
     pub places: ErrorLocations,
@@ -61,7 +61,7 @@ pub fn band(data: &[RecordingSegment]) -> Option<f64> {
     bands.reduce(f64::min)
 }
 
-/// Error figures over several recordings: over every sample whose force was measured, and below `band_hz`, Hz.
+/// Error metrics over several recordings: over every sample whose force was measured, and below `band_hz`, Hz.
 /// `forces` are the model's, `[drive][sample]` for each recording.
 ///
 /// Fails when a recording has no forces, or when forces differ in number.
@@ -96,7 +96,7 @@ pub fn figures(
     Ok(figures)
 }
 
-/// Error figures of the rows that a fit used, if decimation made fewer rows than samples; else `None`.
+/// Error metrics of the rows that a fit used, if decimation made fewer rows than samples; else `None`.
 ///
 /// Fails as [`figures`] does.
 pub fn figures_of_rows(

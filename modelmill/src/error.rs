@@ -10,13 +10,15 @@ use modelmill_identify::{FiguresError, FilterError, FitFileError, LeastSquaresEr
 /// Result of a method of the library.
 pub type Outcome<T = ()> = Result<T, Error>;
 
-/// Why a method returned no result. Each variant states where the fault is, what was expected, and what to do.
+/// The reason why a method returned no result. The message of each variant states where the fault is, what was
+/// expected, and what to do.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
-    /// A model, rig or plan file is invalid; every finding has its place.
+    /// A model, rig or plan file is invalid. It contains all errors and warnings of the file, each with its line and
+    /// column.
     Model(Box<modelmill_spec::LoadFailure>),
-    /// The mechanism cannot be derived.
+    /// The equations of the mechanism cannot be derived.
     Derivation {
         /// Name of the model file in messages.
         model: String,
@@ -29,20 +31,21 @@ pub enum Error {
     Fit(Box<FitFileError>),
     /// Least squares has no solution.
     LeastSquares(LeastSquaresError),
-    /// Measured forces and forces of the model do not match in number or size.
+    /// Error metrics cannot be computed: measured and model forces have different lengths, are not finite, or there are
+    /// no samples.
     Figures(FiguresError),
-    /// A filter does not suit the recording.
+    /// A filter is not applicable to the recording, such as a cut-off above half the sampling rate.
     Filter(FilterError),
     /// Another fault of an input.
     Input(Message),
-    /// Options that contradict each other, or that the method does not have.
+    /// Options contradict each other, or the method does not support them.
     Options(Message),
     /// The caller stopped the job.
     Cancelled,
 }
 
 impl Error {
-    /// A fault of an input, from a text or message that describes it.
+    /// An error of an input; `says` is its text or message.
     pub fn input(says: impl Into<Message>) -> Self {
         Self::Input(says.into())
     }
@@ -60,7 +63,7 @@ impl Error {
         }
     }
 
-    /// The error text, with remedies spelled for the reader: as options of the program, in Python or in Rust.
+    /// The error text, with remedies formatted for the reader: as command-line options, in Python or in Rust.
     pub fn spell(&self, spelling: &dyn RemedySpelling) -> String {
         match self {
             Self::Model(failure) => failure.render_spelled(false, spelling),
@@ -68,8 +71,9 @@ impl Error {
         }
     }
 
-    /// The error as a message. For an invalid model file it is a text with snippets of the file, in which
-    /// [`Error::spell`] spells the remedies.
+    /// The error as a message, whose remedies can be formatted for any reader. For an invalid model file it is plain
+    /// text with excerpts of the file, with remedies in the Rust form; use [`Error::spell`] to get them in another
+    /// form.
     pub fn message(&self) -> Message {
         match self {
             Self::Model(failure) => failure.render(false).into(),

@@ -1,13 +1,18 @@
-//! modelmill as a library: from a declarative model file to base parameters, equations and fast code.
-//! From recordings it identifies parameter values, detects the effects that a model lacks, and writes a page about
-//! them.
+//! modelmill as a library: from a declarative model file it derives base parameters, equations and fast code.
+//! From recordings it identifies parameter values, detects the physical effects that a model lacks, and writes these
+//! findings as one page.
 //!
-//! The library uses no terminal, no fixed path and no global state. Files, libraries of effects and progress come from
-//! a [`Host`]. Results are values; [`mod@print`] and [`report`] convert them to text, JSON and pages. Advice in a text
-//! is spelled by a [`print::StepSpelling`], since the command line, Python and Rust write the same request differently.
+//! The library uses no terminal, no fixed path and no global state. A [`Host`] provides files and libraries of effects,
+//! and passes progress to the caller's listener. Results are values; [`mod@print`] and [`report`] convert them to text,
+//! JSON and pages. A [`print::StepSpelling`] formats the recommended next steps for the reader: as a command, as a
+//! Python call, or in words for a caller of the Rust library.
 //!
 //! All quantities are in SI units (m, rad, kg, s, N, N m). A recording or a model file may declare other units for its
 //! own values.
+//!
+//! Equation and table numbers, such as eq. (16) and Table 1, are those of the paper "Dynamic Modeling and
+//! Identification of a Complex-structured Parallel Robot" about the robot SpiderMill. The page `docs/experiment.html`
+//! of the repository reproduces its experiment.
 //!
 //! # A first model
 //!
@@ -15,12 +20,14 @@
 //! use modelmill::Model;
 //!
 //! let model = Model::open("../model-spec/models/spidermill-paper.toml")?;
+//! // `retained` is the product of parameters whose regressor column was kept for this base parameter.
 //! let first = &model.base[0];
 //! assert_eq!((first.name.as_str(), first.retained.as_str()), ("p1_min", "m1*dc1"));
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! A model can also be read from text ([`Model::from_text`]). Every fault of a file is reported with its place:
+//! A model can also be read from text ([`Model::from_text`]). Every error of a file is reported with its line and
+//! column:
 //!
 //! ```
 //! let Err(modelmill::Error::Model(faults)) = modelmill::Model::from_text("arm.toml", "schema = 1\nname = 3") else {
@@ -31,32 +38,32 @@
 //!
 //! # Methods
 //!
-//! Methods of [`Model`] need a derived model; methods of [`Host`] need none.
+//! Methods of [`Model`] need a model whose equations have been derived; methods of [`Host`] do not.
 //!
 //! | method | what it does |
 //! |---|---|
-//! | [`Model::check`] | summary of the model, and its numeric rank compared with the exact one |
-//! | [`model::ModelChanges::from_models`] | what a variant changes in entries, base parameters and operation counts |
-//! | [`variants::VariantComparison::along_recordings`] | forces, power, work, limits and errors of two variants |
+//! | [`Model::check`] | summary of the model, and the numeric rank of its regressor (over random states) compared with the exact rank |
+//! | [`model::ModelChanges::from_models`] | entries, base parameters and operation counts that differ between a model and its variant |
+//! | [`variants::VariantComparison::along_recordings`] | forces, power, work, use of limits, and errors of two variants |
 //! | [`Host::kinds`] | the kinds of effects that a model may have |
 //! | [`Model::with_added_effects`] | the model with effects added to its file |
 //! | [`Model::picture`] | the mechanism at a pose, as SVG |
-//! | [`Model::equations`] | p_g, dependencies, p_min and programs as a page |
-//! | [`Model::generate`] | source code |
+//! | [`Model::equations`] | parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and straight-line programs, as a page |
+//! | [`Model::generate`] | source code of the model in a target language |
 //! | [`Model::evaluate`] | forces along a recording |
 //! | [`Model::functions`] | forces, regressor, mass matrix and other functions at given states |
-//! | [`Model::identify`] | base parameters from recordings, eq. (12) |
-//! | [`Model::compare`] | error figures, and the regions in which errors occur |
+//! | [`Model::identify`] | base parameters from recordings by least squares, eq. (12) |
+//! | [`Model::compare`] | error metrics (such as the NRMS), and the regions in which errors occur |
 //! | [`Model::diagnose`] | the physical effects that are missing |
-//! | [`Model::runs`] | what changed between recordings of one machine |
+//! | [`Model::runs`] | changes between recordings of one machine |
 //! | [`report::page`] | a diagnosis as one page |
-//! | [`Host::simulate`] | the simulation of a full-body rig along a trajectory |
+//! | [`Host::simulate`] | simulation of a rig (a numeric stand-in for the machine, with every body modelled) along a trajectory |
 //! | [`Host::reduce`] | the reduction of a rig to a planar model |
 //! | [`Host::import`] | a model file from a URDF, MJCF or SDF |
 //! | [`export::description`], [`Model::export`] | a URDF or MJCF from a model file, or from a fit |
 //! | [`Model::adopt`] | the model file with the values of a fit |
 //! | [`Model::interpret`] | physical parameters from base parameters |
-//! | [`Model::excite`] | the motion that determines base parameters, or separates effects, best |
+//! | [`Model::excite`] | the excitation trajectory that determines the base parameters best, or that best distinguishes an effect from its alternatives |
 //!
 //! ## Check, compare variants, write equations and code
 //!
@@ -106,7 +113,7 @@
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! ## Find what is missing, and add it
+//! ## Find missing effects, and add them
 //!
 //! ```
 //! use modelmill::diagnose::DiagnosisOptions;
@@ -127,7 +134,7 @@
 //! # Ok::<(), modelmill::Error>(())
 //! ```
 //!
-//! ## Motions and rigs
+//! ## Plan an excitation trajectory, reduce a rig
 //!
 //! ```
 //! use std::path::Path;
@@ -157,14 +164,15 @@
 //! # Progress, cancellation, notes
 //!
 //! A [`progress::ProgressListener`] of the host receives the name and the progress of each job, can stop it
-//! ([`Error::Cancelled`]), and receives notes when they occur. Results contain the same notes as [`RecordingNote`]s.
+//! ([`Error::Cancelled`]), and receives notes when they occur. Results contain these notes too; their type is
+//! [`RecordingNote`].
 //!
 //! # Modules
 //!
-//! In the order of the data flow, each based on those before it: [`text`], [`error`], [`progress`], [`host`],
-//! [`model`], [`segment`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`], [`states`], [`identify`],
-//! [`diagnose`], [`add`], [`adopt`], [`runs`], [`interpret`], [`excite`], [`variants`], [`generate`], [`simulate`],
-//! [`reduce`], [`mod@import`], [`mod@export`], [`picture`], [`atlas`], [`mod@print`], [`report`].
+//! In the order of the data flow; each module uses only modules before it: [`text`], [`error`], [`progress`], [`host`],
+//! [`model`], [`picture`], [`atlas`], [`segment`], [`along`], [`audit`], [`recording`], [`compare`], [`evaluate`],
+//! [`states`], [`identify`], [`runs`], [`diagnose`], [`add`], [`adopt`], [`interpret`], [`excite`], [`variants`],
+//! [`generate`], [`simulate`], [`reduce`], [`mod@import`], [`mod@export`], [`mod@print`], [`report`].
 
 pub mod add;
 pub mod adopt;

@@ -66,7 +66,7 @@ pub(crate) fn equations(model: &Model, saved: Option<&Model>) -> Value {
         "gone": gone,
         "summary": summary.text(modelmill::text::TerminalStyle::PLAIN),
         "products": model.derivation.reduction.products.len(),
-        "coordinates": model.motions().iter().map(|(name, is_angle)| {
+        "coordinates": model.active_coordinate_types().iter().map(|(name, is_angle)| {
             let mut all = model.derivation.mechanism.coordinates.iter();
             let nominal = all.find(|c| c.name == *name).map_or(0.0, |c| c.nominal);
             json!({ "name": name, "angle": is_angle, "nominal": nominal })

@@ -300,7 +300,7 @@ struct ColumnHypothesis {
 /// All hypotheses: angles in degrees, coordinates with the wrong sign, and exchanged pairs, in this order.
 fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnHypothesis> {
     let columns = Remedy::option(OptionName::Columns);
-    let motions = model.motions();
+    let active = model.active_coordinate_types();
     let mut hypotheses = Vec::new();
     // A factor changes positions and derivatives alike.
     let scaled = |coordinates: Vec<usize>, factor: f64| -> Box<MotionChange<'static>> {
@@ -315,11 +315,11 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
         })
     };
     // All angles together, since a recorder uses one unit.
-    let angles: Vec<usize> = (0..motions.len()).filter(|i| motions[*i].1).collect();
+    let angles: Vec<usize> = (0..active.len()).filter(|i| active[*i].1).collect();
     if !angles.is_empty() {
         hypotheses.push(ColumnHypothesis {
             kind: UNITS,
-            at: angles.iter().map(|i| motions[*i].0.clone()).collect(),
+            at: angles.iter().map(|i| active[*i].0.clone()).collect(),
             says: "the angles seem to be in degrees".to_owned(),
             advice: message!(
                 "they must be in rad; use {}",
@@ -328,7 +328,7 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
             change: scaled(angles, 1.0_f64.to_radians()),
         });
     }
-    for (a, (name, _)) in motions.iter().enumerate() {
+    for (a, (name, _)) in active.iter().enumerate() {
         hypotheses.push(ColumnHypothesis {
             kind: WRONG_SIGN,
             at: vec![name.clone()],
@@ -338,15 +338,15 @@ fn hypotheses(model: &Model, maps_from_degrees: &[OptionSetting]) -> Vec<ColumnH
         });
     }
     // Only coordinates of one kind can be exchanged.
-    for a in 0..motions.len() {
-        for b in a + 1..motions.len() {
-            if motions[a].1 == motions[b].1 {
+    for a in 0..active.len() {
+        for b in a + 1..active.len() {
+            if active[a].1 == active[b].1 {
                 hypotheses.push(ColumnHypothesis {
                     kind: EXCHANGED,
-                    at: [a, b].map(|i| motions[i].0.clone()).to_vec(),
+                    at: [a, b].map(|i| active[i].0.clone()).to_vec(),
                     says: format!(
                         "the coordinates `{}` and `{}` seem to be exchanged",
-                        motions[a].0, motions[b].0
+                        active[a].0, active[b].0
                     ),
                     advice: message!("check which column is which ({})", columns),
                     change: Box::new(move |states| {

@@ -27,7 +27,7 @@ const STEP: f64 = 1e-5;
 /// parameters; `None` if the forces cannot be evaluated next to the recorded motion.
 pub(crate) fn sensitivities(model: &Model, all: &SegmentList<'_>, values: &[f64]) -> Vec<Option<[ForceColumn; 3]>> {
     // One coordinate at a time; a failure of one does not affect the others.
-    let coordinates = 0..model.motions().len();
+    let coordinates = 0..model.active_coordinate_types().len();
     coordinates.map(|i| sensitivity(model, all, values, i)).collect()
 }
 
@@ -36,7 +36,7 @@ pub(crate) fn zeros(model: &Model, slopes: &[Option<[ForceColumn; 3]>]) -> Vec<C
     let (active, _) = model.derivation.coordinates();
     let has_encoder = |i: &usize| !is_free(&model.derivation.mechanism, *i);
     // A free body is measured by other means than an encoder.
-    let each = model.motions().into_iter().zip(slopes).zip(active);
+    let each = model.active_coordinate_types().into_iter().zip(slopes).zip(active);
     let each = each.filter_map(|(one, i)| has_encoder(&i).then_some(one));
     let candidate = |((name, is_angle), slopes): ((String, bool), &Option<[ForceColumn; 3]>)| {
         let [by_position, ..] = slopes.as_ref()?;
@@ -85,9 +85,9 @@ pub(crate) fn encoders(
     problem: &DiagnosisProblem,
     slopes: &[Option<[ForceColumn; 3]>],
 ) -> Vec<CandidateEffect> {
-    let motions = model.motions();
+    let active = model.active_coordinate_types();
     let mut candidates = Vec::new();
-    for (i, (name, is_angle)) in motions.iter().enumerate() {
+    for (i, (name, is_angle)) in active.iter().enumerate() {
         // Position, rate or acceleration.
         let of = |order: usize| -> Vec<f64> {
             let mut all_values = Vec::new();

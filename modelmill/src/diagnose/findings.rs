@@ -1,5 +1,5 @@
-//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model
-//! before and after the effects, and regions where the error is largest. Text, JSON and the page print them.
+//! Findings of a diagnosis as values: verdict, missing effects with estimates and alternatives, the model without and
+//! with the effects found, and regions where the error is largest. Text, JSON and the page print them.
 
 use modelmill_boundary::message;
 use modelmill_boundary::text::{CommandName, Message, OptionName, Remedy};
@@ -53,14 +53,14 @@ fn check_prediction(answer: &DiagnosisSolution, judged: ValidationMethod) -> Out
     )))
 }
 
-/// Options of a diagnosis. [`DiagnosisOptions::default`] estimates all parameters that are not known in the model
-/// file.
+/// Options of a diagnosis. [`DiagnosisOptions::default`] estimates all base parameters whose values are not known, see
+/// [`Model::is_known`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagnosisOptions {
-    /// Which parameters keep their nominal values.
+    /// Which base parameters are fixed at their nominal values; the others are estimated.
     pub fixed: FixedParameters,
-    /// Whether to diagnose again with all base parameters fixed, if estimates differ from their nominal values.
-    /// Estimated parameters may hide a missing effect.
+    /// Whether to repeat the diagnosis with all base parameters fixed if some estimates differ from their nominal
+    /// values. Such estimates may hide a missing effect.
     pub repeat_with_nominal: bool,
 }
 
@@ -73,108 +73,118 @@ impl Default for DiagnosisOptions {
     }
 }
 
-/// Findings of a diagnosis.
+/// The findings of a diagnosis, which [`Model::diagnose`] returns.
 pub struct DiagnosisFindings {
-    /// Verdict, error after each step, candidates with the reasons of their rejection, and the unexplained residual.
+    /// Verdict, error after each step of the search, all candidates with the reasons why they were rejected, and the
+    /// residual.
     pub diagnosis: ModelDiagnosis,
-    /// Missing effects.
+    /// The effects found: those that the model lacks.
     pub missing: Vec<MissingEffect>,
-    /// Laws that are in no library and would explain the residual: hypotheses.
+    /// Hypotheses: force laws that are in no library and would explain the residual.
     pub laws: Vec<LawHypothesis>,
     /// Effects that the recordings can neither show nor exclude.
     pub undecided: Vec<UndecidedEffect>,
-    /// Base parameters of the bodies that differ from the file, the one with the most standard deviations first.
+    /// Base parameters of the bodies whose estimates differ from the file, sorted by the difference between
+    /// estimate and nominal value in standard deviations of the estimate, largest first.
     pub off_nominal: Vec<OffNominalParameter>,
-    /// The diagnosis with all parameters fixed at their nominal values, if it was requested and some estimates differ.
+    /// The second diagnosis, with all base parameters fixed at their nominal values. `None` if it was not requested,
+    /// was not needed because no estimate differs, or the first one has fixed them all already.
     pub with_nominal: Option<NominalDiagnosis>,
-    /// Regions of the unexplained residual, or, without one, of the error of the model as it is.
+    /// Ranges of a coordinate, rate, load or time for the report. If the verdict is [`DiagnosisVerdict::Unexplained`],
+    /// those of the residual of the unexplained drives; otherwise those of `places`.
     pub regions: Vec<ErrorRegion>,
-    /// The model as it is, along all recordings.
+    /// The given model, without added effects, along all recordings.
     pub before: ModelVersion,
-    /// The model with the effects found, or why there is none; the reason is empty if no effect was found.
+    /// The model with the effects found, or the reason why there is none. The reason is empty if there is no effect to
+    /// add.
     pub after: Result<ModelVersion, Message>,
-    /// The effects found, as entries of a model file.
+    /// The effects found, as entries of a model file. Effects that a model file cannot contain have no entry.
     pub entries: Vec<NewEffect>,
-    /// The model file with these entries.
+    /// The model file with these entries; `None` if there are none or they cannot be added.
     pub edited: Option<CompletedModelFile>,
-    /// Regions where the error without added effects is largest.
+    /// Ranges of a variable that contain more than their share of the squared error of the given model.
     pub places: ErrorLocations,
-    /// Regions where the residual with the effects is largest.
+    /// The same for the model with the effects found; `None` if there is no such model.
     pub residual_locations: Option<ErrorLocations>,
-    /// The data on which errors are judged.
+    /// The data on which errors are evaluated: validation runs, or cross-validation.
     pub validation: ValidationMethod,
-    /// Notes on the recordings.
+    /// Notes on the model, on the recordings, and on estimates with an impossible sign.
     pub notes: Vec<RecordingNote>,
-    /// The problem and its solution, without the columns.
+    /// The search problem and its solution, without the columns.
     pub(crate) answer: DiagnosisSolution,
-    /// Variables on which errors may depend, along the recordings that are judged.
+    /// Variables on which errors may depend, along the recordings on which errors are evaluated.
     pub(crate) variables: Vec<(String, Vec<f64>)>,
 }
 
-/// An effect that is missing.
+/// An effect that the model lacks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MissingEffect {
-    /// Its kind and places.
+    /// Its kind, and the elements of the mechanism (such as drives, coordinates and points) on which it acts.
     pub effect: LocatedEffect,
-    /// Its parameters and constants.
+    /// Estimates of its parameters and constants.
     pub estimates: Vec<EffectEstimate>,
     /// Probability that the effect is present, between 0 and 1.
     pub probability: f64,
-    /// Effects that explain the recordings equally well.
+    /// Its alternatives: effects that explain the recordings equally well.
     pub indistinguishable_from: Vec<LocatedEffect>,
-    /// Experiment that distinguishes it from these, by the text of the library.
+    /// Experiment that distinguishes it from these, as described in the effect library. `None` if there are no
+    /// alternatives, or the library describes no experiment.
     pub separating_experiment: Option<String>,
-    /// Request for a motion that distinguishes it from these, if one can be planned.
+    /// Request for a motion that distinguishes it from these, for [`Model::excite`]. `None` if there are no
+    /// alternatives, or no motion can be planned.
     pub separation: Option<SeparationProposal>,
 }
 
 /// An effect that the recordings can neither show nor exclude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UndecidedEffect {
-    /// Its kind and places.
+    /// Its kind, and the elements of the mechanism (such as drives, coordinates and points) on which it acts.
     pub effect: LocatedEffect,
-    /// Why, as a sentence without the last full stop.
+    /// The reason, as a sentence without capital letter and full stop.
     pub reason: String,
-    /// Experiment that would decide.
+    /// Experiment that would show whether the effect is present.
     pub separating_experiment: String,
 }
 
-/// Request for a motion that distinguishes effects.
+/// Request for a motion that distinguishes an effect from its alternatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeparationProposal {
-    /// The effect that was found, with its values.
+    /// The effect found, with the values of its parameters and constants.
     pub effect: NamedEffect,
-    /// Effects that it may be confused with.
+    /// Its alternatives: effects that explain the recordings equally well.
     pub rivals: Vec<LocatedEffect>,
-    /// Effects that are present in either case, with their constants.
+    /// The other effects found, which are assumed to be present whether this effect or one of its rivals is the true
+    /// one, with their constants.
     pub common_effects: Vec<NamedEffect>,
-    /// Noise of the forces, root mean square over the drives (N or N m), if it is known.
+    /// Noise of the forces, rms over the drives, N or N m; `None` if it is zero or unknown.
     pub noise: Option<f64>,
 }
 
-/// An estimate of a found effect.
+/// The estimate of a parameter or constant of an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectEstimate {
     /// Symbol of the parameter or constant.
     pub name: String,
     /// Its value.
     pub value: f64,
-    /// Standard deviation, if identification determines the parameter by itself.
+    /// Standard deviation. `None` for a constant, and for a parameter that is identifiable only in combination with
+    /// others, not individually.
     pub std: Option<f64>,
-    /// Unit of the value.
+    /// SI unit of the value.
     pub unit: String,
 }
 
-/// A diagnosis with all parameters fixed at their nominal values.
+/// A diagnosis with all base parameters fixed at their nominal values.
 pub struct NominalDiagnosis {
-    /// Verdict, steps and candidates.
+    /// Verdict, error after each step of the search, all candidates, and the residual.
     pub diagnosis: ModelDiagnosis,
-    /// Missing effects with their estimates.
+    /// The effects found, with their estimates.
     pub missing: Vec<(LocatedEffect, Vec<EffectEstimate>)>,
 }
 
 impl DiagnosisFindings {
-    /// The entries that are worth adding: none while the recording or the model is in doubt.
+    /// The entries that should be added: none if a suspected fault (exchanged columns, wrong sign, wrong units, wrong
+    /// direction of gravity) could be the cause of the findings.
     pub fn entries_to_add(&self) -> &[NewEffect] {
         if words::has_suspicion(&self.diagnosis) {
             &[]
@@ -183,7 +193,8 @@ impl DiagnosisFindings {
         }
     }
 
-    /// Advice if not all effects can be added to the model file: a doubtful recording, or a delayed force signal.
+    /// Advice if not all effects can be added to the model file: because of a suspected fault, or of a delayed force
+    /// signal.
     pub(crate) fn further_action(&self) -> Option<&'static str> {
         if self.missing.is_empty() {
             return None;
@@ -203,11 +214,11 @@ impl DiagnosisFindings {
 }
 
 impl Model {
-    /// Finds which physical effects the model lacks. Parameters are fitted to `fit`; errors are judged on the
-    /// validation runs `check`, or by cross-validation without any.
+    /// Finds the physical effects that the model lacks. Parameters are fitted to the recordings `fit`. Errors are
+    /// evaluated on the validation runs `check`, or by cross-validation if there are none. `question` are the options.
     ///
-    /// Fails if a recording is too short, has no forces, or has positions at which the loops of the mechanism
-    /// cannot close.
+    /// Fails if a recording is too short, has no forces, or contains positions at which the loops of the mechanism
+    /// cannot close, and if the fitted model predicts the forces worse than a model without any force.
     pub fn diagnose(
         &self,
         fit: &[&PreparedRecording],
@@ -270,7 +281,7 @@ impl Model {
             }
         };
         let [fit_data, check_data] = data;
-        // The model without effects, for comparison.
+        // The given model, for comparison.
         let before = ModelVersion::new(self.clone(), fit_data, check_data, held)?;
         let places = judged_error_locations(&before)?;
         let left = after.as_ref().ok().map(self::judged_error_locations).transpose()?;
@@ -312,7 +323,7 @@ impl Model {
 }
 
 impl DiagnosisFindings {
-    /// The model with what was found, or as it is.
+    /// The model with the effects found, or the given model if there is none.
     pub fn final_version(&self) -> &ModelVersion {
         self.after.as_ref().unwrap_or(&self.before)
     }
@@ -330,7 +341,7 @@ impl DiagnosisFindings {
         format!("{known} {motion}").trim().to_owned()
     }
 
-    /// Names of the drives, in the order of the channels.
+    /// Names of the drives, in the order of the indices used in `diagnosis`. A channel is the force of one drive.
     pub fn channels(&self) -> &[String] {
         &self.answer.problem.layout.channels
     }
@@ -565,7 +576,8 @@ fn separation(findings: &DiagnosisFindings, found: &IdentifiedEffect) -> Option<
     })
 }
 
-/// Regions of the unexplained residual, or, without one, of the error of the model as it is.
+/// Regions of the residual of the unexplained drives if the verdict is that it is unexplained, otherwise of the error
+/// of the given model.
 fn regions(findings: &DiagnosisFindings) -> Vec<ErrorRegion> {
     let diagnosis = &findings.answer.diagnosis;
     if diagnosis.verdict != DiagnosisVerdict::Unexplained {
@@ -608,7 +620,7 @@ fn overall_region(findings: &DiagnosisFindings, channel: usize) -> ErrorRegion {
     }
 }
 
-/// Regions of the error of a model, on the recordings on which errors are judged.
+/// Regions of the error of a model, on the recordings on which errors are evaluated.
 fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
     let judged = version.validation_runs();
     let (first, last) = (judged.first().copied().unwrap_or(0), judged.last().map_or(0, |k| k + 1));
@@ -619,7 +631,7 @@ fn judged_error_locations(version: &ModelVersion) -> Outcome<ErrorLocations> {
     compare::error_locations(&version.model, &version.data[first..last], &measured, &forces)
 }
 
-/// Variables along the recordings that are judged, one after the other.
+/// Variables along the recordings on which errors are evaluated, one after the other.
 ///
 /// Fails when a pose has no solution.
 fn variables(version: &ModelVersion) -> Outcome<Vec<(String, Vec<f64>)>> {

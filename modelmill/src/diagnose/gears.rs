@@ -69,7 +69,7 @@ pub(crate) fn gears(
             continue;
         };
         // Units depend on the kind of the joint.
-        let is_angle = model.motions()[i].1;
+        let is_angle = model.active_coordinate_types()[i].1;
         for (kind, symbol) in KINDS {
             let is_yielding = kind == "drive_compliance";
             // Displacement of the load and its derivatives: order 0, 1 and 2.

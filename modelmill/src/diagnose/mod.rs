@@ -1,14 +1,27 @@
-//! `diagnose`: which physical effect a model lacks. Input are a model and recordings, output are [`DiagnosisFindings`].
-//! Candidates come from the effect library, their columns from the derivation of the model, and a search over
-//! sets of them decides.
+//! `diagnose`: which physical effects a model lacks. Inputs are a model and recordings; the output is
+//! [`DiagnosisFindings`].
 //!
-//! `places` -> `candidates` (the effects that `add` could add) -> `columns` (their forces along the recordings)
-//! -> `problem` (states and solves the search), with `long_recordings` (fewer samples of long recordings), `faults`
-//! (faults of recordings, subtracted first), and candidates that a model file cannot contain: `encoders`,
-//! `gears`, `memory`, `payloads`, `constants` -> `added_effects` (the model file with the effects found) -> `model_versions`
-//! (both models, identified, along all recordings) -> `off_nominal` (base parameters that differ from the file)
-//! -> `findings`. `requested_effects` does the same for effects that the user names, `words` writes sentences,
-//! `thresholds` has the numbers that decide.
+//! Candidate effects come from the effect library; their regressor columns come from the derivation of the model. A
+//! search over sets of candidates selects those that are missing.
+//!
+//! The modules, in the order of the data flow:
+//!
+//! 1. `long_recordings`: decimates long recordings.
+//! 2. `places`: lists the places of the mechanism on which effects may act.
+//! 3. `candidates`: derives the effects that `add` could add to the model file.
+//! 4. `columns`, `numbers`: evaluate the forces of these effects along the recordings.
+//! 5. `faults`: finds faults of recordings, which are subtracted or left out before the search.
+//! 6. `encoders`, `gears`, `memory`, `payloads`, `constants`, `tilt`, `held_friction`: add candidates that a model file
+//!    cannot contain.
+//! 7. `problem`: formulates the search with all of these, and solves it.
+//! 8. `added_effects`: adds the effects found to the model file, in memory.
+//! 9. `model_versions`: identifies the models without and with the effects, and evaluates them along all recordings.
+//! 10. `off_nominal`: lists base parameters whose estimates differ from the nominal values.
+//! 11. `laws`: lists force laws that are in no library and would explain the residual.
+//! 12. `findings`: collects the results.
+//!
+//! In addition, `requested_effects` derives and evaluates effects that the user names, `words` writes sentences, and
+//! `thresholds` contains the numbers that decide.
 
 pub(crate) mod added_effects;
 mod candidates;

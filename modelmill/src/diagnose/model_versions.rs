@@ -1,4 +1,4 @@
-//! The model before and after the effects, each identified and evaluated along all recordings.
+//! The models without and with the effects found, each identified and evaluated along all recordings.
 
 use crate::along;
 use crate::diagnose::FixedParameters;
@@ -8,7 +8,7 @@ use crate::identify::{EquationWeights, EstimatorOptions};
 use crate::model::Model;
 use crate::segment::RecordingSegment;
 
-/// A model with its forces along the recordings.
+/// A model with its forces along all recordings.
 pub struct ModelVersion {
     /// The model.
     pub model: Model,
@@ -16,11 +16,11 @@ pub struct ModelVersion {
     pub identified: Option<Identification>,
     /// Forces along the fitted recordings, then along the validation runs.
     pub runs: Vec<ForceComparison>,
-    /// The recordings in the same order.
+    /// The segments of the recordings, in the order of `runs`.
     pub data: Vec<RecordingSegment>,
 }
 
-/// Forces along a recording, `[drive][sample]`.
+/// Measured and calculated forces along a segment of a recording, `[drive][sample]`.
 pub struct ForceComparison {
     /// The recording's name.
     pub name: String,
@@ -43,8 +43,8 @@ impl ForceComparison {
 }
 
 impl ModelVersion {
-    /// Identifies a model from the fitted recordings, with each drive weighted by its residual as in the
-    /// diagnosis. If all parameters are fixed, the nominal values are used.
+    /// Identifies a model from the recordings `fit`, with each drive weighted by the standard deviation of its
+    /// residual, as in the diagnosis. If all parameters are fixed, the nominal values are used.
     ///
     /// Fails when the identification fails, or when a pose has no solution.
     pub fn new(
@@ -90,7 +90,8 @@ impl ModelVersion {
         })
     }
 
-    /// Indices of the recordings on which errors are judged: the validation runs, or the fitted ones without any.
+    /// Indices in `runs` of the recordings on which errors are evaluated: the validation runs, or the fitted recordings
+    /// if there are none.
     pub fn validation_runs(&self) -> Vec<usize> {
         let has_check = self.runs.iter().any(|run| run.is_check);
         (0..self.runs.len())

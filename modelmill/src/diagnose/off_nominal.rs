@@ -17,11 +17,11 @@ pub struct OffNominalParameter {
     pub parameter: FitParameter,
     /// Its nominal value.
     pub nominal: f64,
-    /// Difference in standard deviations.
+    /// Magnitude of the difference, in standard deviations of the estimate.
     pub sigmas: f64,
 }
 
-/// Base parameters of the bodies that differ from the file, the one with the most standard deviations first.
+/// Base parameters of the bodies whose estimates differ from the file, the one with the most standard deviations first.
 pub(super) fn off_nominal_parameters(version: &ModelVersion) -> Vec<OffNominalParameter> {
     let Some(identified) = &version.identified else {
         return Vec::new();

@@ -31,12 +31,12 @@ use super::thresholds::FEWEST_SAMPLES;
 use super::words;
 use crate::regressors::{SegmentList, regressor};
 
-/// Which parameters are fixed at their nominal values.
+/// Which base parameters are fixed at their nominal values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FixedParameters {
-    /// Those that are marked as known in the model file.
+    /// Only those that are known: they contain no dynamic parameter, see [`Model::is_known`].
     Known,
-    /// All.
+    /// All base parameters. Values of a fit with a covariance are a prior instead, see [`Model::with_fit`].
     All,
 }
 

@@ -10,12 +10,12 @@ use crate::text::table::{number, percent, significant};
 
 use super::thresholds::{HARDLY_LOWER, NOISE_FREE_ROUNDINGS};
 
-/// The data on which errors are judged.
+/// The data on which errors are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ValidationMethod {
-    /// On validation runs: recordings that were not fitted.
+    /// Validation runs: recordings that were not fitted.
     Check,
-    /// On blocks of the fitted recordings, each left out of the fit in turn.
+    /// Cross-validation: blocks of the fitted recordings, each left out of the fit in turn.
     CrossValidation,
 }
 

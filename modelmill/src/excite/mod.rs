@@ -273,10 +273,10 @@ fn picture(
             .collect();
         figure.panel(title, &curves);
     };
-    let motions = model.motions();
-    let unit = match motions.iter().filter(|(_, is_angle)| *is_angle).count() {
+    let active = model.active_coordinate_types();
+    let unit = match active.iter().filter(|(_, is_angle)| *is_angle).count() {
         0 => "m",
-        angles if angles == motions.len() => "rad",
+        angles if angles == active.len() => "rad",
         _ => "rad or m",
     };
     let title = format!("position around the mean ({}), {unit}", means.join(", "));

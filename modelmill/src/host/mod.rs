@@ -1,4 +1,4 @@
-//! What the library gets from its caller: files, libraries of effects, and a listener for progress.
+//! The interface between the library and its caller: files, libraries of effects, and a listener for progress.
 
 pub(crate) mod kinds_of_files;
 
@@ -13,9 +13,10 @@ use modelmill_spec::{EffectKind, LoadedModel};
 use crate::error::{Error, Outcome};
 use crate::progress::{JobHandle, ProgressListener, SilentProgress, run_job};
 
-/// Source of files, libraries of effects in addition to the built-in one, and the listener for progress and notes.
+/// Provides files and libraries of effects in addition to the built-in one, and passes progress and notes to a
+/// listener.
 ///
-/// Every model keeps the host that read it, so that later reads, such as those of a variant with one more effect, use
+/// Every model keeps the host with which it was read. Files that are read for it later, such as recordings, come from
 /// the same source.
 #[derive(Clone)]
 pub struct Host {
@@ -23,7 +24,7 @@ pub struct Host {
     files: Arc<dyn FileSource>,
     /// Paths of libraries of effects in addition to the built-in one.
     libraries: Vec<PathBuf>,
-    /// Whether constants are replaced by their numbers before the derivation.
+    /// Whether constants are replaced by their numeric values before the derivation.
     is_at_values: bool,
     /// Receives progress and notes.
     progress: Arc<dyn ProgressListener>,
@@ -41,7 +42,7 @@ impl Default for Host {
 }
 
 impl Host {
-    /// A host that reads files from disk, with no further libraries and no listener.
+    /// A host that reads files from disk, uses only the built-in library of effects, and has no listener.
     pub fn new() -> Self {
         Self::default()
     }
@@ -70,7 +71,7 @@ impl Host {
         &*self.files
     }
 
-    /// The host with further libraries of effect kinds, for every model that it reads.
+    /// The host with further libraries of effects, which every model that it reads may use.
     #[must_use]
     pub fn with_libraries(mut self, paths: impl IntoIterator<Item = PathBuf>) -> Self {
         self.libraries.extend(paths);
@@ -102,16 +103,18 @@ impl Host {
         self
     }
 
-    /// Whether models are derived for the values of their files alone. Constants are then numbers
-    /// ([`modelmill_spec::Mechanism::with_numeric_constants`]): special geometry leaves fewer base parameters, and
-    /// emitted code has no geometry to change.
+    /// Whether constants are replaced by their numeric values before the derivation
+    /// ([`modelmill_spec::Mechanism::with_numeric_constants`]).
+    ///
+    /// The model is then valid for this geometry only: special geometry can reduce the number of base parameters, and
+    /// generated code has no geometric constants as inputs.
     #[must_use]
     pub fn at_values(mut self, is_wanted: bool) -> Self {
         self.is_at_values = is_wanted;
         self
     }
 
-    /// Whether models are derived for the values of their files alone.
+    /// Whether constants are replaced by their numeric values before the derivation.
     pub fn is_at_values(&self) -> bool {
         self.is_at_values
     }
@@ -123,7 +126,7 @@ impl Host {
 
     /// The kinds of effects of the built-in library and of the host's libraries.
     ///
-    /// Fails with every finding about the host's libraries, each with its place.
+    /// Fails with all errors and warnings of the host's libraries, each with its line and column.
     ///
     /// ```
     /// let kinds = modelmill::Host::new().kinds()?;
@@ -134,9 +137,9 @@ impl Host {
         Ok(modelmill_spec::kinds_with(&self.libraries, self.files())?)
     }
 
-    /// Reads a model file and validates it, without deriving it.
+    /// Reads a model file and validates it, without deriving its equations.
     ///
-    /// Fails with every finding about the files, each with its place.
+    /// Fails with all errors and warnings of the files, each with its line and column.
     pub fn load(&self, path: &Path) -> Outcome<LoadedModel> {
         run_job(&*self.progress, &format!("reading {}", path.display()), 0, |_| {
             modelmill_spec::load_file_with(path, &self.libraries, self.files())
@@ -158,7 +161,7 @@ impl Host {
 
     /// Validates the text of a model file; `path` is its name in messages, and paths in the text are relative to it.
     ///
-    /// Fails with every finding about the files, each with its place.
+    /// Fails with all errors and warnings of the files, each with its line and column.
     pub fn load_text(&self, path: &Path, text: &str) -> Outcome<LoadedModel> {
         let name = path.to_string_lossy();
         Ok(modelmill_spec::load_with(&name, text, &self.libraries, self.files())?)
@@ -166,7 +169,8 @@ impl Host {
 
     /// Adds an effect to the text of a model file, keeping its comments and layout; the result is validated.
     ///
-    /// Fails when the edited file is invalid: unknown kind or place, a missing value, or an effect given twice.
+    /// Fails when the edited file is invalid, such as by an unknown kind or place, a missing value, or an effect that
+    /// the file already has.
     pub fn edit(&self, path: &str, text: &str, effect: &NewEffect) -> Outcome<EditedModel> {
         add_to_model(path, text, effect, &self.libraries, self.files()).map_err(|failure| match failure {
             EditFailure::Effect(says) => Error::input(format!("{path}: {says}")),
@@ -174,24 +178,24 @@ impl Host {
         })
     }
 
-    /// Runs a job whose progress the listener receives and which it can stop. `total` is the number of steps, 0 if
-    /// unknown.
+    /// Runs a job. The listener receives its progress and can cancel it. `what` is the name of the job, and `total` its
+    /// number of steps, 0 if unknown.
     ///
-    /// Fails with [`Error::Cancelled`] if it was requested to stop.
+    /// Fails with [`Error::Cancelled`] if the job was cancelled.
     pub fn run_job<T>(&self, what: &str, total: usize, work: impl FnOnce(&JobHandle) -> T) -> Outcome<T> {
         run_job(&*self.progress, what, total, work)
     }
 
-    /// Reads a fit file, as `identify` writes it.
+    /// Reads a fit file: the JSON that `identify` writes.
     ///
-    /// Fails with the place of what is wrong with the file.
+    /// Fails if the file cannot be read or is not such a file; the error states the place of the fault.
     pub fn fit(&self, path: &Path) -> Outcome<FitFile> {
         Ok(FitFile::read_from(self.files(), path)?)
     }
 
-    /// Reads a fit from its text; `file` is its name in messages.
+    /// Reads a fit from the text of its file; `file` is the name of the file in messages.
     ///
-    /// Fails with the place of what is wrong with it.
+    /// Fails as [`Host::fit`] does.
     pub fn fit_of_text(&self, text: &str, file: &str) -> Outcome<FitFile> {
         Ok(FitFile::parse(text, file)?)
     }

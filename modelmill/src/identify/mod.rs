@@ -1,4 +1,5 @@
-//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error figures.
+//! `identify`: base parameters from recordings by least squares, eq. (12), with standard deviations and error metrics
+//! (such as the NRMS).
 
 mod influence;
 mod instruments;
@@ -33,21 +34,21 @@ pub use refine::{EstimateRefinement, RefinementResult};
 use regression::{InstrumentStatistics, RegressionEstimate};
 use thresholds::{IMPOSSIBLE_SIGN_SIGMAS, WEAK_INSTRUMENT_CORRELATION};
 
-/// A fit, with the figures of the nominal parameters on the same recordings.
+/// A fit, with the error metrics of the nominal parameters on the same recordings.
 pub struct Identification {
-    /// The fit, in the form of a fit file.
+    /// The fit: the contents of a fit file.
     pub fit: FitFile,
-    /// Error figures of the nominal parameters on the recordings of the fit.
+    /// Error metrics of the nominal parameters on the recordings of the fit.
     pub nominal_fit: ErrorFigures,
-    /// The same on the validation runs; `None` without any.
+    /// Error metrics of the nominal parameters on the validation runs; `None` if there are none.
     pub nominal_check: Option<ErrorFigures>,
-    /// The estimate with its statistics.
+    /// The solution of the least-squares problem, with its statistics.
     pub found: RegressionEstimate,
-    /// The options of the estimator, with automatic choices made.
+    /// The options of the estimator, with automatic weights replaced by the chosen ones.
     pub options: EstimatorOptions,
-    /// Notes on the result; the fit contains them too.
+    /// Notes on the result. `fit` contains them too, together with the notes on the recordings.
     pub notes: Vec<RecordingNote>,
-    /// Periods and noise floors of periodic recordings, with their file names.
+    /// File names of the periodic recordings, each with the period and the noise floor.
     pub repeats: Vec<(String, RunRepeatability)>,
 }
 
@@ -55,8 +56,8 @@ impl Model {
     /// Identifies the base parameters from the recordings of `fit`, eq. (12), and validates the result with those of
     /// `check`.
     ///
-    /// Fails when there are fewer equations than unknowns, when no force was measured, or when a recording contains a
-    /// pose that the mechanism cannot reach.
+    /// Fails when there are fewer equations than unknown parameters, when no force was measured, or when a recording
+    /// contains a pose that the mechanism cannot reach.
     pub fn identify(
         &self,
         fit: &[&PreparedRecording],
@@ -66,8 +67,8 @@ impl Model {
         self.identify_with(fit, &Instruments::None, check, options)
     }
 
-    /// As [`Model::identify`], by instrumental variables, against noise that is correlated with the states through the
-    /// controller.
+    /// As [`Model::identify`], by instrumental variables. They avoid the bias of least squares if the controller
+    /// correlates the measurement noise with the states.
     ///
     /// ```no_run
     /// use modelmill::Model;
@@ -139,9 +140,9 @@ fn resolve_weights(
     }
 }
 
-/// Identifies a model from some segments and validates it with others.
+/// Identifies a model from the segments `data`, and validates the result with the segments `check`.
 ///
-/// Fails when the equations cannot be solved, when a pose has no solution, or when it is cancelled.
+/// Fails when the equations cannot be solved, when a pose has no solution, or when the job is cancelled.
 pub fn identify(
     model: &Model,
     data: &[RecordingSegment],
@@ -169,9 +170,9 @@ pub fn identify(
     let notes = remarks(model, &found, &parameters);
     let values: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     let names: Vec<String> = unknown.into_iter().map(|info| info.expression).collect();
-    // Fit and validation use one band, so that their figures can be compared.
+    // Fit and validation use one band, so that their error metrics can be compared.
     let band = compare::band(data);
-    // Error figures of identified and nominal values, on fit and validation runs.
+    // Error metrics of identified and nominal values, on fit and validation runs.
     let (fit, nominal_fit) = both_figures(model, data, &values, band)?;
     let recordings = data.iter().chain(check);
     let repeats = recordings
@@ -353,7 +354,7 @@ fn undetermined_text(p: &FitParameter) -> String {
     }
 }
 
-/// Error figures with identified and with nominal values, over all samples and over the rows of the fit.
+/// Error metrics with identified and with nominal values, over all samples and over the rows of the fit.
 fn both_figures(
     model: &Model,
     data: &[RecordingSegment],

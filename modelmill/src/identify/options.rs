@@ -2,38 +2,40 @@
 
 use crate::identify::refine::EstimateRefinement;
 
-/// Options of the estimation. [`EstimatorOptions::default`] is least squares, with weights by drive where these are
-/// needed.
+/// Options of the estimation. [`EstimatorOptions::default`] is least squares with [`EquationWeights::Automatic`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EstimatorOptions {
     /// Weights of the equations.
     pub weights: EquationWeights,
-    /// Bound of Huber's robust estimate: residuals beyond this many standard deviations (estimated by their median)
-    /// get less weight; 1.345 is usual.
+    /// Bound of Huber's robust estimator (1): residuals larger than this many standard deviations get less weight. The
+    /// standard deviation is estimated per drive as 1.4826 times the median of the absolute residuals; 1.345 is usual.
+    /// `None` for no robust estimation.
     pub robust: Option<f64>,
     /// Refinement of the least-squares solution.
     pub refinement: EstimateRefinement,
-    /// Exclude an equation while its drive is slower than this fraction of its fastest rate, since friction at
-    /// standstill may have any value; 0.01 is usual.
+    /// Bound of standstill (1): equations of a drive are excluded while it is slower than this fraction of its fastest
+    /// rate, since friction at standstill may have any value. 0.01 is usual; `None` excludes no equation.
     pub standstill: Option<f64>,
 }
 
-/// Weights of the equations.
+/// Weights of the equations, one equation per drive and sample. A channel is the force of one drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EquationWeights {
-    /// `Channels` if drives have different units, or if cut-off and decimation were chosen automatically; else `None`.
+    /// [`Self::Channels`] if drives have different units, or if cut-off and decimation were chosen automatically;
+    /// otherwise [`Self::None`]. With one drive or with instruments always [`Self::None`].
     #[default]
     Automatic,
     /// Equal weights: ordinary least squares.
     None,
-    /// Equations of each drive are divided by the standard deviation of its residuals (iterated).
+    /// Equations of each drive are divided by the standard deviation of its residuals. Fit and weights are iterated.
     Channels,
-    /// Equations of each sample are divided by its standard deviation, from the columns `DRIVE_var` of the recording.
+    /// Each equation is divided by the standard deviation of its measured force: the square root of the variance in the
+    /// column `DRIVE_var` of the recording.
     Variance,
 }
 
 impl EquationWeights {
-    /// Its name in the JSON and in options.
+    /// Name of the weights in the JSON and in options.
     pub fn name(self) -> &'static str {
         match self {
             Self::Automatic => "automatic",

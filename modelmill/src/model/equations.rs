@@ -12,13 +12,13 @@ use crate::model::sampled_rank::{SampledRank, judge_rank};
 pub struct EquationsText {
     /// The text, in the requested format.
     pub text: String,
-    /// Notes on the numeric rank, eq. (9), compared with the exact one.
+    /// Notes on the numeric rank of the regressor, eq. (9), compared with the exact rank.
     pub notes: Vec<RecordingNote>,
 }
 
 impl Model {
-    /// The equations as a page: p_g, dependencies, p_min, intermediate variables, numbers of operations. The page of
-    /// a long chain takes seconds.
+    /// The equations as a page: parameter products p_g, linear dependencies of the regressor columns, base parameters
+    /// p_min, straight-line programs and numbers of operations. For a long chain this takes seconds.
     ///
     /// Fails only when the listener stops the job.
     ///

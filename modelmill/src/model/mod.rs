@@ -1,4 +1,4 @@
-//! A model file that was read and derived, with the names and units that users see.
+//! A model file that was read, with the equations derived from it and the names and units that users see.
 
 mod changes;
 mod entries;
@@ -32,7 +32,7 @@ pub use sampled_rank::SampledRank;
 pub use summary::{ModelCheck, ModelSummary};
 pub use values::BaseParameterValues;
 
-/// A model file that was read and derived. A clone shares the derivation.
+/// A model file that was read, with the equations derived from it. A clone shares the derivation.
 #[derive(Clone)]
 pub struct Model {
     /// The file's name without folder and extension; also the name of the model in the JSON.
@@ -41,13 +41,14 @@ pub struct Model {
     pub path: String,
     /// The contents of the file.
     pub loaded: Arc<LoadedModel>,
-    /// The derivation: reduced equations and programs.
+    /// The derivation: parameter products p_g, linear dependencies of the regressor columns, base parameters p_min and
+    /// straight-line programs.
     pub derivation: Arc<Derivation>,
     /// The base parameters, eq. (16), with names, expressions and units.
     pub base: Vec<BaseParameterEntry>,
-    /// Their values, from the file's nominal values or from a fit, in their units.
+    /// Values of the base parameters, in their units: computed from the file's nominal values, or identified in a fit.
     pub nominal: Vec<f64>,
-    /// Notes on the file in addition to the warnings of `loaded`, such as entries without effect.
+    /// Notes on the file in addition to the warnings of `loaded`, such as entries that are ignored.
     pub notes: Vec<RecordingNote>,
     /// Covariance of the values in `nominal`, if they come from a fit that has one.
     covariance: Option<Arc<DMatrix<f64>>>,
@@ -55,15 +56,15 @@ pub struct Model {
     identified: Vec<bool>,
     /// The sign that each dynamic parameter must have, in the order of the mechanism.
     signs: Vec<Sign>,
-    /// The source of the file and of later reads.
+    /// Provides the file, and all files that are read later.
     host: Host,
 }
 
 impl Model {
-    /// Reads a model file from disk and derives it.
+    /// Reads a model file from disk and derives its equations.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why the mechanism cannot be
-    /// derived.
+    /// Fails with all errors and warnings of the file, each with its line and column, or with the reason why the
+    /// equations cannot be derived.
     ///
     /// ```
     /// use modelmill::Model;
@@ -76,7 +77,8 @@ impl Model {
         Host::new().model(path)
     }
 
-    /// Derives a model from the text of its file, which must not extend another file. `name` is its name in messages.
+    /// Reads a model from the text of its file and derives its equations. The text must not extend another file. `name`
+    /// is the name of the file in messages.
     ///
     /// Fails as [`Model::open`] does.
     ///
@@ -94,19 +96,19 @@ impl Model {
 }
 
 impl Host {
-    /// Reads a model file and derives it.
+    /// Reads a model file and derives its equations.
     ///
-    /// Fails with every finding about the file, each with its place, or with the reason why the mechanism cannot be
-    /// derived.
+    /// Fails with all errors and warnings of the file, each with its line and column, or with the reason why the
+    /// equations cannot be derived.
     pub fn model(&self, path: impl AsRef<Path>) -> Outcome<Model> {
         let path = path.as_ref();
         let loaded = self.load(path)?;
         self.derive(&path.display().to_string(), loaded)
     }
 
-    /// Derives a model that was read from `path`.
+    /// Derives the equations of a model file that was read from `path`.
     ///
-    /// Fails with the reason why the mechanism cannot be derived.
+    /// Fails with the reason why the equations cannot be derived.
     pub fn derive(&self, path: &str, mut loaded: LoadedModel) -> Outcome<Model> {
         if self.is_at_values() {
             loaded.mechanism = loaded.mechanism.with_numeric_constants();
@@ -117,7 +119,7 @@ impl Host {
                 modelmill_codegen::derive(mechanism)
             })?
             .map_err(|error| Error::derivation(path, error))?;
-        // Findings about the derived model become notes with their place in the file.
+        // Warnings about the derived model become notes with their line and column in the file.
         let mut notes = Vec::new();
         notes.extend(caution(&derivation, path));
         for (k, says) in ineffective_retained(&derivation) {
@@ -163,7 +165,7 @@ impl Host {
     }
 }
 
-/// The base parameters, with expressions as the page of equations writes them out.
+/// The base parameters, with the same expressions as on the page of equations.
 fn base(derivation: &Derivation) -> Vec<BaseParameterEntry> {
     let mut base = derivation.base_parameters();
     for (k, one) in base.iter_mut().enumerate() {
@@ -172,13 +174,15 @@ fn base(derivation: &Derivation) -> Vec<BaseParameterEntry> {
     base
 }
 
-/// The warning of a base that is valid for one geometry only; `None` for general constants.
+/// A warning if the base parameters are valid only for the geometry of the file; `None` if they are valid for all
+/// values of the constants.
 fn caution(derivation: &Derivation, path: &str) -> Option<RecordingNote> {
     let says = derivation.reduction.method.caution()?;
     Some(RecordingNote::warning(format!("{path}: {says}")))
 }
 
-/// Entries of `retain` without effect, each with its index in the list and the reason.
+/// Entries of the list `retain` (products whose columns are to be kept) that cannot be retained, each with its index in
+/// the list and the reason.
 pub fn ineffective_retained(derivation: &Derivation) -> Vec<(usize, String)> {
     let reduction = &derivation.reduction;
     let mechanism = &derivation.mechanism;
@@ -253,7 +257,7 @@ fn multiple_of(exact: &ExactExpression) -> Option<ParameterIdx> {
 }
 
 impl Model {
-    /// The host that read the model.
+    /// The host with which the model was read.
     pub fn host(&self) -> &Host {
         &self.host
     }
@@ -263,13 +267,13 @@ impl Model {
         self.loaded.sources.files.first().map_or("", |file| &file.text)
     }
 
-    /// Paths of all files that were read for it.
+    /// Paths of all files that were read for the model: its own file, files that it extends, and libraries of effects.
     pub fn files(&self) -> impl Iterator<Item = &Path> {
         self.loaded.sources.paths()
     }
 
-    /// The warning of base parameters that were found numerically and are valid for this geometry only; `None` for
-    /// others.
+    /// A warning if the base parameters are valid only for the geometry of this file (found numerically, or derived
+    /// with constants replaced by their values); otherwise `None`.
     pub fn caution(&self) -> Option<RecordingNote> {
         caution(&self.derivation, &self.path)
     }
@@ -284,8 +288,8 @@ impl Model {
         mechanism.gravity.each_ref().map(|g| g.evaluate(&value))
     }
 
-    /// Names of the active coordinates, each with whether it is an angle (rad) or a length (m).
-    pub fn motions(&self) -> Vec<(String, bool)> {
+    /// The active coordinates: name, and `true` for an angle (rad) or `false` for a length (m).
+    pub fn active_coordinate_types(&self) -> Vec<(String, bool)> {
         let coordinates = self.derivation.mechanism.coordinates.iter();
         coordinates
             .filter(|c| !c.passive)
@@ -293,7 +297,8 @@ impl Model {
             .collect()
     }
 
-    /// The products of parameters in a base parameter, each with its factor for the file's constants.
+    /// The products of dynamic parameters whose linear combination is the base parameter `k`, each with its
+    /// coefficient, evaluated with the constants of the file.
     pub fn products_of(&self, k: usize) -> Vec<(&ParameterMonomial, f64)> {
         let reduction = &self.derivation.reduction;
         let constants = &self.derivation.mechanism.constants;
@@ -309,17 +314,20 @@ impl Model {
         products
     }
 
-    /// The sign that a dynamic parameter must have, by its index in the mechanism.
+    /// The sign that a dynamic parameter must have. `parameter` is its index in the mechanism.
     pub fn sign_of(&self, parameter: usize) -> Sign {
         self.signs[parameter]
     }
 
-    /// Nominal values as priors of some base parameters, each product of parameters with the relative standard
-    /// deviation `sigma`. Base parameters without a nominal value get no prior.
-    pub fn beliefs(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
+    /// Priors for the base parameters `among`, with their nominal values as means. Each product of parameters in a base
+    /// parameter is assumed to have the relative standard deviation `sigma`, and these uncertainties are added as root
+    /// sum of squares. Base parameters without a nominal value get no prior.
+    ///
+    /// The index in each prior is a position in `among`.
+    pub fn parameter_priors(&self, among: &[usize], sigma: f64) -> Vec<ParameterPrior> {
         let parameters = &self.derivation.mechanism.parameters;
         let values: Vec<f64> = parameters.iter().map(|p| p.nominal).collect();
-        let believed = among.iter().enumerate().filter_map(|(i, k)| {
+        let priors = among.iter().enumerate().filter_map(|(i, k)| {
             // Summands may cancel, their uncertainties do not.
             let squares = self
                 .products_of(*k)
@@ -332,15 +340,18 @@ impl Model {
                 std: sigma * squares.sqrt(),
             })
         });
-        believed.collect()
+        priors.collect()
     }
 
-    /// Whether a base parameter consists of numbers of the model file only, so that it is not identified.
+    /// Whether a base parameter contains no dynamic parameter, only constants and numbers, so that its value is known
+    /// and not identified.
     pub fn is_known(&self, k: usize) -> bool {
         self.products_of(k).iter().all(|(p, _)| p.0.is_empty())
     }
 
-    /// Whether the retained product of a base parameter belongs to an effect, not to the bodies.
+    /// Whether a base parameter belongs to an effect, not to the bodies: its retained product contains a parameter of
+    /// an effect. The retained product is the product of parameters whose regressor column was kept for this base
+    /// parameter.
     pub fn is_effect(&self, k: usize) -> bool {
         let reduction = &self.derivation.reduction;
         let powers = &reduction.products[reduction.retained[k]].0;
@@ -349,7 +360,8 @@ impl Model {
         terms.any(|term| powers.iter().any(|(p, _)| *p == term.parameter.0))
     }
 
-    /// The sign that a base parameter must have, if all of its summands have the same sign; else `Any`.
+    /// The sign that a base parameter must have: that of its products if all of them must have the same sign, otherwise
+    /// `Any`.
     pub fn sign(&self, k: usize) -> Sign {
         // Even powers keep the sign; a factor of unknown sign leaves the product open.
         let sign_of = |(product, factor): &(&ParameterMonomial, f64)| {
@@ -393,26 +405,26 @@ impl Model {
             .collect()
     }
 
-    /// Names of the drives, in the order of the rows of the regressor.
+    /// Names of the regressor rows, in their order: drives, and rows without an actuator.
     pub fn drives(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         drives.map(|d| d.name.clone()).collect()
     }
 
-    /// Names of the rows on which no drive acts, among [`Model::drives`].
+    /// Names of the regressor rows without an actuator, a subset of [`Model::drives`], which lists all rows.
     pub fn undriven_rows(&self) -> Vec<String> {
         let drives = self.derivation.mechanism.drives.iter();
         let undriven = drives.filter(|drive| !drive.is_driven);
         undriven.map(|drive| drive.name.clone()).collect()
     }
 
-    /// Unit of a drive's force: `N` or `N m`.
+    /// Unit of the force of a drive: `N` or `N m`. `drive` is an index into [`Model::drives`].
     pub fn force_unit(&self, drive: usize) -> &'static str {
         let mechanism = &self.derivation.mechanism;
         mechanism.drives[drive].kind.force_unit(&mechanism.coordinates)
     }
 
-    /// The base parameters as a fit file lists them.
+    /// The base parameters in the form of a fit file: name, expression, unit and nominal value.
     pub fn parameter_infos(&self) -> Vec<ParameterInfo> {
         self.base
             .iter()
@@ -426,10 +438,11 @@ impl Model {
             .collect()
     }
 
-    /// The model with other values of its base parameters, such as those of a fit, in its order.
+    /// The model with other values of its base parameters, such as those of a fit. `values` has the order of `base`,
+    /// and its values count as identified.
     ///
     /// # Panics
-    /// If the number of values is not that of the base parameters.
+    /// If the number of values differs from the number of base parameters.
     ///
     /// ```
     /// use modelmill::Model;
@@ -450,8 +463,10 @@ impl Model {
         }
     }
 
-    /// The model with the values of a fit, see [`Model::values_of`]. If the fit has a covariance, [`Model::diagnose`]
-    /// allows fixed values to differ by that uncertainty.
+    /// The model with the values of a fit, see [`Model::values_of`].
+    ///
+    /// If the fit has a covariance and a diagnosis fixes all parameters, [`Model::diagnose`] does not fix them exactly:
+    /// it uses the values and their covariance as a prior.
     #[must_use]
     pub fn with_fit(&self, fit: &BaseParameterValues) -> Self {
         Self {
@@ -485,12 +500,14 @@ impl Model {
         self
     }
 
-    /// Whether the value of a base parameter was identified, in the file or in a fit, and not computed from parameters.
+    /// Whether the value of a base parameter was identified (in a fit, or as `identified.base` in the file), and not
+    /// computed from the nominal values of parameters.
     pub fn is_identified(&self, k: usize) -> bool {
         self.identified[k]
     }
 
-    /// Whether the value of a base parameter was identified, or the file gives nominal values for one of its products.
+    /// Whether a base parameter has a nominal value: it was identified, or the file gives nominal values other than
+    /// zero for all factors of one of its products.
     pub fn has_nominal(&self, k: usize) -> bool {
         if self.identified[k] {
             return true;
@@ -517,8 +534,8 @@ impl Model {
         })
     }
 
-    /// Whether passive coordinates are solved for by Newton's method from state to state, because a closed form is
-    /// missing.
+    /// Whether passive coordinates (determined by loop closure) are solved for iteratively, by Newton's method from
+    /// state to state, because there is no closed form.
     pub fn has_iterative_loops(&self) -> bool {
         matches!(
             self.derivation.programs.passive_position,
@@ -526,7 +543,8 @@ impl Model {
         )
     }
 
-    /// Kinds of the effects whose force depends on the load of the drive.
+    /// Kinds of the model's effects whose force depends on the load of the drive. An effect appears once for each entry
+    /// in the file.
     pub fn load_dependent_effects(&self) -> Vec<&str> {
         let effects = self.derivation.mechanism.effects.iter();
         effects

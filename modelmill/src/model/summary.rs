@@ -13,7 +13,8 @@ pub struct ModelCheck {
     pub model: Model,
     /// Its contents.
     pub summary: ModelSummary,
-    /// Eq. (9) on the file's values, if it was found.
+    /// Numeric rank of the regressor over random states, eq. (9), at the values of the file. `None` if it could not be
+    /// computed.
     pub rank: Option<SampledRank>,
     /// Contradictions between the numeric rank and the exact reduction.
     pub warnings: Vec<String>,
@@ -25,7 +26,8 @@ impl Model {
         ModelSummary::new(&self.derivation)
     }
 
-    /// Checks the model: its contents, and its numeric rank compared with the exact one.
+    /// Checks the model: its contents, and the numeric rank of its regressor (over random states) compared with the
+    /// exact rank.
     ///
     /// Fails only when the listener stops the job.
     ///
@@ -71,7 +73,7 @@ pub struct ModelSummary {
     pub loops: Vec<String>,
     /// Names of the drives, including those that share rows.
     pub drives: Vec<String>,
-    /// Names of the rows on which no drive acts.
+    /// Names of the regressor rows without an actuator.
     pub undriven: Vec<String>,
     /// Kinds of the effects, one for each effect.
     pub effects: Vec<String>,

@@ -1,6 +1,7 @@
-//! Spelling of advice for its reader: commands for a terminal, calls for a notebook or for Rust.
+//! Formats remedies and recommended next steps for the reader: as commands, as Python calls, or in words for a caller
+//! of the Rust library.
 //!
-//! [`RemedySpelling`] writes remedies inside of messages, [`StepSpelling`] complete steps with a model.
+//! [`RemedySpelling`] formats remedies within messages, [`StepSpelling`] complete steps with a model.
 
 use std::fmt::Write as _;
 
@@ -12,7 +13,8 @@ use modelmill_spec::edit::NewEffect;
 use crate::diagnose::SeparationProposal;
 use crate::model::Model;
 
-/// Writes the next steps after a diagnosis for their reader. The program writes commands, a notebook calls.
+/// Formats the recommended next steps after a diagnosis for the reader. The program writes commands, the Python package
+/// writes calls.
 pub trait StepSpelling: RemedySpelling {
     /// Adds an effect to the file of a model.
     fn spell_effect(&self, model: &Model, effect: &NewEffect) -> String;

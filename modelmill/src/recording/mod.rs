@@ -1,5 +1,5 @@
-//! Recordings for a model: read with the names of the model file and the user, prepared, and checked before any
-//! result is computed.
+//! Recordings for a model: read with the column names given in the model file or by the user, prepared, and checked
+//! before any result is computed.
 
 mod choice;
 mod columns;
@@ -153,21 +153,21 @@ fn prepare(model: &Model, recording: &Raw, args: &RecordingOptions, delay: f64) 
     let is_examined = !preparation.unexamined;
     // Notes on the recording are added to its first segment.
     if let Some(first) = runs.first_mut().filter(|_| is_examined) {
-        let mut motions = model.motions();
+        let mut coordinates = model.active_coordinate_types();
         // Rates of free bodies are twists, no derivatives of the coordinates with their names.
         let free: Vec<&str> = free::free_bodies(&model.derivation.mechanism)
             .flat_map(|body| body.position.iter().chain(&body.quaternion))
             .map(|i| model.derivation.mechanism.coordinates[i.0].name.as_str())
             .collect();
-        motions.retain(|(name, _)| !free.contains(&name.as_str()));
-        let suspicions = recording.suspicious_columns(&motions, preparation.source);
+        coordinates.retain(|(name, _)| !free.contains(&name.as_str()));
+        let suspicions = recording.suspicious_columns(&coordinates, preparation.source);
         first.notes.splice(0..0, suspicions);
-        let oddities = recording.signal_notes(&model.motions(), &model.drives());
+        let oddities = recording.signal_notes(&model.active_coordinate_types(), &model.drives());
         first.notes.splice(0..0, oddities);
     }
     // Remedies for angles in degrees are kept, in case the audit finds such angles.
-    let motions = model.motions();
-    let angles = motions.iter().filter(|(_, is_angle)| *is_angle);
+    let coordinates = model.active_coordinate_types();
+    let angles = coordinates.iter().filter(|(_, is_angle)| *is_angle);
     let maps_from_degrees: Vec<OptionSetting> = angles
         .flat_map(|(name, _)| recording.degree_conversion_options(name))
         .collect();
@@ -218,7 +218,7 @@ fn position_fault(model: &Model, file: &str, fault: &PositionFault) -> Disturban
         ),
         PositionFault::Backlash { coordinate, width } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let unit = if model.motions().iter().any(is_angle) {
+            let unit = if model.active_coordinate_types().iter().any(is_angle) {
                 "rad"
             } else {
                 "m"
@@ -273,8 +273,8 @@ fn note_idle_options(data: &mut [RecordingSegment], args: &RecordingOptions) {
     }
 }
 
-/// Warns about recordings that are given twice, also as copies: they have double weight, or make a validation run
-/// useless.
+/// Adds warnings about recordings that are given twice, also as copies. In the fit (`data`) such a recording has double
+/// weight; as a validation run (`check`) it proves nothing.
 pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut [RecordingSegment]) {
     // A recording is compared with all earlier ones.
     for k in 1..data.len() {
@@ -299,10 +299,11 @@ pub fn note_duplicates(model: &Model, data: &mut [RecordingSegment], check: &mut
     }
 }
 
-/// A recording for a model: its raw content, and its segments without gaps in time, prepared for the model.
+/// A recording that was read and prepared for a model.
 #[derive(Clone)]
 pub struct PreparedRecording {
-    /// One segment, or several if the recording has gaps in time.
+    /// The parts of the recording without gaps in time, each with its states and forces. There is one if the recording
+    /// has no gaps.
     pub segments: Vec<RecordingSegment>,
     /// The recording before preparation.
     raw: Arc<Raw>,
@@ -311,10 +312,12 @@ pub struct PreparedRecording {
 }
 
 impl Model {
-    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), prepares its states, and checks it. The notes
-    /// of its segments state what was done and what looks suspicious.
+    /// Reads a recording (CSV, Parquet, MATLAB, HDF5, MCAP, rosbag2), computes positions, rates and accelerations from
+    /// it (filtered, differentiated and decimated as needed), and checks it. Its notes list these steps and all
+    /// suspicious signals.
     ///
-    /// Fails with place and remedy when a column is missing or contains no numbers, or when time does not increase.
+    /// Fails when a column is missing or contains no numbers, or when time does not increase. The error states the
+    /// place and the remedy.
     ///
     /// ```no_run
     /// use modelmill::Model;
@@ -327,6 +330,7 @@ impl Model {
     ///     ..RecordingOptions::default()
     /// };
     /// let run = model.recording("run.csv", &options)?;
+    /// // `says` is the text of a note. Its remedies are written here as fields of the Rust options.
     /// for note in run.notes() {
     ///     println!("{}", note.says.in_library_words());
     /// }
@@ -336,8 +340,8 @@ impl Model {
         self.recording_of(&[path.as_ref()], reading)
     }
 
-    /// As [`Model::recording`], for several files of one run, whose columns are joined on time: the slowest file sets
-    /// the sample times, and the others are interpolated to them.
+    /// As [`Model::recording`], for several files of one run. Their columns are joined on time: the file with the
+    /// lowest sampling rate determines the sample times, and the others are interpolated to them.
     pub fn recording_of(&self, paths: &[&Path], reading: &RecordingOptions) -> Outcome<PreparedRecording> {
         let opened = RecordingFiles::open(self.host().files(), paths);
         let read = opened
@@ -357,7 +361,7 @@ impl Model {
         PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], for columns in memory with their names, such as those of a data frame. NaN marks
+    /// As [`Model::recording`], for named columns in memory, such as those of a data frame. NaN marks
     /// missing values. `name` is the name of the table in messages.
     ///
     /// Fails as [`Model::recording`] does, and when columns differ in length.
@@ -371,8 +375,8 @@ impl Model {
         PreparedRecording::new(self, raw, reading)
     }
 
-    /// As [`Model::recording`], for a file in memory, such as an object of a store. `name` is its name in messages,
-    /// and its extension determines the format.
+    /// As [`Model::recording`], for a file in memory, such as one downloaded from object storage. `name` is its name in
+    /// messages, and its extension determines the format.
     ///
     /// Fails as [`Model::recording`] does.
     pub fn recording_of_bytes(
@@ -426,13 +430,13 @@ impl PreparedRecording {
         self.raw.file()
     }
 
-    /// The values of a column by its name in the model, one for each sample, before any filter; `None` if there is no
-    /// such column of finite numbers.
+    /// The values of a column as they were recorded, one for each sample, before any filter. `name` is its name in the
+    /// model. `None` if there is no such column, or if it has values that are not finite.
     pub fn raw_column(&self, name: &str) -> Option<&[f64]> {
         self.raw.column(name).ok()
     }
 
-    /// Notes on all segments.
+    /// The notes of all segments.
     pub fn notes(&self) -> impl Iterator<Item = &RecordingNote> {
         self.segments.iter().flat_map(RecordingSegment::notes)
     }

@@ -14,7 +14,7 @@ pub struct RecordingOptions {
     pub preparation: StatePreparation,
     /// Whether to leave out samples with NaN, infinite or empty fields. If not, such a recording is refused.
     pub skip_bad_samples: bool,
-    /// Whether to leave forces during contacts and pushes out of fits and error figures: intervals in which no
+    /// Whether to leave forces during contacts and pushes out of fits and error metrics: intervals in which no
     /// parameters explain the forces.
     pub leave_out_events: bool,
     /// Read only the samples between these times, s.

@@ -307,7 +307,7 @@ fn physical_change(model: &Model, kind: &ChangeKind, found: &SelectedChange, val
 fn unit(model: &Model, kind: &ChangeKind) -> &'static str {
     match kind {
         ChangeKind::Friction(d) | ChangeKind::Offset(d) | ChangeKind::Scale(d) => model.force_unit(*d),
-        ChangeKind::EncoderZero(i) if model.motions()[*i].1 => "rad",
+        ChangeKind::EncoderZero(i) if model.active_coordinate_types()[*i].1 => "rad",
         ChangeKind::EncoderZero(_) | ChangeKind::Payload(_) => "m",
         ChangeKind::Clock => "1",
     }
@@ -467,7 +467,7 @@ fn change_text(model: &Model, what: &PhysicalChange) -> String {
         }
         PhysicalChange::EncoderZero { coordinate, shift } => {
             let is_angle = |(name, is): &(String, bool)| name == coordinate && *is;
-            let is_angle = model.motions().iter().any(is_angle);
+            let is_angle = model.active_coordinate_types().iter().any(is_angle);
             format!(
                 "the zero of {coordinate}: the true position is {} from the encoder's",
                 shift.text(if is_angle { "rad" } else { "m" })

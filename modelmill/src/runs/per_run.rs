@@ -505,12 +505,15 @@ fn per_run_columns(
             origin: 1.0,
         }],
         "zero" => (places("coordinate", model.active_coordinates())?.into_iter())
-            .map(|i| PerRunColumns {
-                quantity: format!("zero@{}", model.active_coordinates()[i]),
-                columns: vec![layout.zero(i)],
-                names: named(&[("shift", if model.motions()[i].1 { "rad" } else { "m" })]),
-                is_against_first: true,
-                origin: 0.0,
+            .map(|i| {
+                let (name, is_angle) = &model.active_coordinate_types()[i];
+                PerRunColumns {
+                    quantity: format!("zero@{name}"),
+                    columns: vec![layout.zero(i)],
+                    names: named(&[("shift", if *is_angle { "rad" } else { "m" })]),
+                    is_against_first: true,
+                    origin: 0.0,
+                }
             })
             .collect(),
         name => vec![base_parameter(model, payloads, infos, name)?],

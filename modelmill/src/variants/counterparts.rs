@@ -136,12 +136,12 @@ fn with_own_load(model: &Model, mut states: RecordingSegment) -> Outcome<Recordi
 ///
 /// Fails when the names or kinds of the active coordinates differ.
 fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
-    let motions = models.map(Model::motions);
+    let active = models.map(Model::active_coordinate_types);
     let place = |of: &[(String, bool)], name: &str| of.iter().position(|(other, _)| other == name);
     // Both directions are tested, so that the message names the model that lacks a coordinate.
     for (here, there) in [(0, 1), (1, 0)] {
-        let names = motions[here].iter().map(|(name, _)| name.as_str());
-        let alone: Vec<&str> = names.filter(|name| place(&motions[there], name).is_none()).collect();
+        let names = active[here].iter().map(|(name, _)| name.as_str());
+        let alone: Vec<&str> = names.filter(|name| place(&active[there], name).is_none()).collect();
         if !alone.is_empty() {
             return Err(Error::input(format!(
                 "{} has no active {} {}, but {} has: two models are compared along one motion of \
@@ -155,15 +155,15 @@ fn coordinates(models: [&Model; 2]) -> Outcome<Vec<usize>> {
     }
     // Coordinates with the same name must have the same unit.
     let mut places = Vec::new();
-    for (name, is_angle) in &motions[1] {
-        let Some(i) = place(&motions[0], name) else {
+    for (name, is_angle) in &active[1] {
+        let Some(i) = place(&active[0], name) else {
             continue;
         };
-        if motions[0][i].1 != *is_angle {
+        if active[0][i].1 != *is_angle {
             let unit = |is_angle: bool| if is_angle { "rad" } else { "m" };
             return Err(Error::input(format!(
                 "`{name}` is in {} in {} and in {} in {}: they cannot share a motion",
-                unit(motions[0][i].1),
+                unit(active[0][i].1),
                 models[0].path,
                 unit(*is_angle),
                 models[1].path

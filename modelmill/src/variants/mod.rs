@@ -39,8 +39,8 @@ pub struct VariantComparison {
     pub drives: Vec<DriveVariants>,
     /// The limits of both files, including those that neither model exceeds.
     pub limits: Vec<LimitUse>,
-    /// Error figures compared with measured forces, as [`Model::compare`] computes them; `None` for a model without
-    /// measured forces.
+    /// Error metrics, by comparison with measured forces, as [`Model::compare`] computes them; `None` for a model
+    /// without measured forces.
     pub errors: [Option<ErrorFigures>; 2],
     /// Notes: what was left out, assumptions, and notes on the recordings.
     pub notes: Vec<RecordingNote>,
@@ -210,7 +210,7 @@ fn load_note(models: [&Model; 2]) -> Option<RecordingNote> {
     })
 }
 
-/// Error figures of a model along those recordings that have forces; `None` if none has.
+/// Error metrics of a model along those recordings that have forces; `None` if none has.
 fn errors(model: &Model, runs: &[RecordingSegment]) -> Outcome<Option<ErrorFigures>> {
     let mut measured = runs.to_vec();
     measured.retain(|one| one.run.force.is_some());

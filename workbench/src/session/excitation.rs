@@ -134,7 +134,8 @@ impl WorkbenchSession {
                 "acceleration": found.acceleration,
             })
         };
-        Ok(json!(model.motions().iter().map(of).collect::<Vec<_>>()))
+        let limits: Vec<Value> = model.active_coordinate_types().iter().map(of).collect();
+        Ok(json!(limits))
     }
 
     /// Starts a search for a trajectory with the current text.

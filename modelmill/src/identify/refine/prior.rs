@@ -19,8 +19,8 @@ pub(super) fn refine(
     nominal: &[f64],
     sigma: f64,
 ) -> Outcome<RefinementResult> {
-    let beliefs = model.beliefs(unknown, sigma);
-    if beliefs.is_empty() {
+    let priors = model.parameter_priors(unknown, sigma);
+    if priors.is_empty() {
         let parameters = &model.derivation.mechanism.parameters;
         let prior = Remedy::option(OptionName::Prior);
         return Err(Error::input(message!(
@@ -37,6 +37,6 @@ pub(super) fn refine(
         )));
     }
     (found.solution, found.uncertainty) =
-        solve_with_prior(&found.r_factor, &found.solution, &found.uncertainty, nominal, &beliefs)?;
-    Ok(RefinementResult::Prior(sigma, beliefs.len()))
+        solve_with_prior(&found.r_factor, &found.solution, &found.uncertainty, nominal, &priors)?;
+    Ok(RefinementResult::Prior(sigma, priors.len()))
 }
