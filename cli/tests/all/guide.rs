@@ -5,6 +5,7 @@
 //! is what they print; `...` stands for what was left out.
 
 use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -324,7 +325,7 @@ fn what_is_shown_as_printed_is_printed() {
                     let found = lines.any(|other| same_words(line, other));
                     if !found {
                         // Lines are compared in their order, so the next ones would be missed too.
-                        faults += &format!("{}: `{line}` is not in\n{out}\n", page.path.display());
+                        let _ = writeln!(faults, "{}: `{line}` is not in\n{out}", page.path.display());
                         break;
                     }
                 }
